@@ -1,0 +1,2 @@
+//! The program `os-convert`.
+fn main() {}

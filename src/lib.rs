@@ -1,0 +1,1 @@
+//! Measurements instead of images: the Open-Structure format, its validator and its tools.

@@ -1,0 +1,360 @@
+//! An MCAP file as a sequence.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
+
+use arrow::datatypes::SchemaRef;
+use mcap::Summary;
+use mcap::sans_io::indexed_reader::{IndexedReadEvent, IndexedReader, IndexedReaderOptions};
+use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader, SummaryReaderOptions};
+use serde::de::DeserializeOwned;
+
+use super::arrow_batch::from_batch;
+use super::arrow_message::{decode_batch, decode_schema};
+use super::counted_file::CountedFile;
+use super::guard::guarded;
+use super::stored_table::StoredTable;
+use super::{Error, names};
+use crate::structure::{Manifest, Record, TableSummary, table_info};
+
+/// Largest chunk that is decompressed; writers keep to a few MiB.
+const MAX_CHUNK_BYTES: u64 = 1 << 29;
+/// Largest plausible ratio of a chunk's sizes; zstd reaches a few thousand on constant data.
+const MAX_CHUNK_RATIO: u64 = 1 << 16;
+
+/// A table's channel.
+#[derive(Clone, Debug)]
+struct TableChannel {
+    id: u16,
+    schema: SchemaRef,
+}
+
+/// An indexed MCAP file that holds a sequence.
+pub(super) struct McapReader {
+    file: CountedFile,
+    summary: Summary,
+    channels: BTreeMap<&'static str, Vec<TableChannel>>,
+    stored: Vec<StoredTable>,
+    passed_over: Vec<String>,
+}
+
+impl McapReader {
+    pub(super) fn open(path: &Path, bytes_read: Arc<AtomicU64>) -> Result<Self, Error> {
+        let file = CountedFile::open(path, bytes_read)?;
+        let summary = guarded(path, "MCAP", || read_summary(&file))?;
+        let failed = |detail: String| Error::Container { path: path.to_owned(), container: "MCAP", detail };
+        for chunk in &summary.chunk_indexes {
+            let limit = chunk.compressed_size.saturating_mul(MAX_CHUNK_RATIO).min(MAX_CHUNK_BYTES);
+            if chunk.uncompressed_size > limit {
+                let what = format!("a chunk's uncompressed size (at byte {})", chunk.chunk_start_offset);
+                return Err(Error::TooLarge {
+                    path: path.to_owned(),
+                    what,
+                    found: chunk.uncompressed_size,
+                    limit,
+                });
+            }
+        }
+        let mut channels: BTreeMap<&'static str, Vec<TableChannel>> = BTreeMap::new();
+        let (mut stored, mut passed_over) = (Vec::new(), Vec::new());
+        let mut listed: Vec<_> = summary.channels.values().collect();
+        listed.sort_by(|left, right| left.topic.cmp(&right.topic).then(left.id.cmp(&right.id)));
+        for channel in listed {
+            let topic = channel.topic.as_str();
+            if topic == names::MANIFEST_TOPIC || topic == names::SUMMARY_TOPIC {
+                continue;
+            }
+            let Some(table) = topic.strip_prefix('/').and_then(table_info) else {
+                passed_over.push(topic.to_owned());
+                continue;
+            };
+            if channel.message_encoding != names::ARROW_ENCODING {
+                return Err(failed(format!(
+                    "topic {topic} has message encoding `{}`; expected `{}`",
+                    channel.message_encoding,
+                    names::ARROW_ENCODING
+                )));
+            }
+            let Some(schema) = channel.schema.as_ref() else {
+                return Err(failed(format!("topic {topic} has no schema")));
+            };
+            let schema = guarded(path, "Arrow", || {
+                decode_schema(&schema.data)
+                    .map_err(|error| failed(format!("schema of topic {topic}: {error}")))
+            })?;
+            let schema = Arc::new(schema);
+            stored.push(StoredTable::new(table, &schema, None));
+            channels.entry(table.name).or_default().push(TableChannel { id: channel.id, schema });
+        }
+        Ok(Self { file, summary, channels, stored, passed_over })
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        self.file.path()
+    }
+
+    /// Tables that are there, known ones alone.
+    pub(super) fn stored(&self) -> &[StoredTable] {
+        &self.stored
+    }
+
+    /// Topics that this version does not know.
+    pub(super) fn passed_over(&self) -> &[String] {
+        &self.passed_over
+    }
+
+    /// The MCAP profile, identity and index, as the validator wants to see them.
+    pub(super) fn summary(&self) -> &Summary {
+        &self.summary
+    }
+
+    /// The Metadata records, by name, with their index.
+    pub(super) fn metadata(&self) -> Result<Vec<mcap::records::Metadata>, Error> {
+        let failed =
+            |detail: String| Error::Container { path: self.path().to_owned(), container: "MCAP", detail };
+        self.summary
+            .metadata_indexes
+            .iter()
+            .map(|index| {
+                guarded(self.path(), "MCAP", || {
+                    let length = usize::try_from(index.length).map_err(|error| failed(error.to_string()))?;
+                    let bytes =
+                        self.file.read_exact_at(index.offset, length).map_err(Error::io(self.path()))?;
+                    // The record's opcode and length stand before its body.
+                    let body =
+                        bytes.get(9..).ok_or_else(|| failed("metadata record is too short".to_owned()))?;
+                    match mcap::parse_record(mcap::records::op::METADATA, body) {
+                        Ok(mcap::records::Record::Metadata(metadata)) => Ok(metadata),
+                        Ok(_) => Err(failed("metadata index points at another record".to_owned())),
+                        Err(error) => Err(failed(error.to_string())),
+                    }
+                })
+            })
+            .collect()
+    }
+
+    fn channel_named(&self, topic: &str) -> Option<u16> {
+        self.summary.channels.values().find(|channel| channel.topic == topic).map(|channel| channel.id)
+    }
+
+    /// The JSON records of a topic.
+    fn json<T: DeserializeOwned>(&self, topic: &str) -> Result<Vec<T>, Error> {
+        let Some(id) = self.channel_named(topic) else { return Ok(Vec::new()) };
+        let mut records = Vec::new();
+        for message in self.messages([topic.to_owned()], None)? {
+            let message = message?;
+            if message.channel == id {
+                records.push(serde_json::from_slice(&message.data).map_err(|error| Error::Manifest {
+                    path: self.path().to_owned(),
+                    detail: format!("topic {topic}: {error}"),
+                })?);
+            }
+        }
+        Ok(records)
+    }
+
+    /// The text of the manifest message, as it is.
+    pub(super) fn manifest_text(&self) -> Result<Vec<u8>, Error> {
+        match self.messages([names::MANIFEST_TOPIC.to_owned()], None)?.next() {
+            Some(message) => Ok(message?.data),
+            None => Err(Error::NotASequence {
+                path: self.path().to_owned(),
+                found: format!("an MCAP file without a message on {}", names::MANIFEST_TOPIC),
+            }),
+        }
+    }
+
+    /// The manifest, with the table summaries put in.
+    pub(super) fn manifest(&self) -> Result<Manifest, Error> {
+        let mut manifest: Manifest = serde_json::from_slice(&self.manifest_text()?)
+            .map_err(|error| Error::Manifest { path: self.path().to_owned(), detail: error.to_string() })?;
+        let summaries: Vec<TableSummary> = self.json(names::SUMMARY_TOPIC)?;
+        if !summaries.is_empty() {
+            manifest.tables = summaries;
+        }
+        Ok(manifest)
+    }
+
+    /// Messages of some topics in time order, within a range of stamps.
+    pub(super) fn messages(
+        &self,
+        topics: impl IntoIterator<Item = String>,
+        stamps: Option<(u64, u64)>,
+    ) -> Result<Messages, Error> {
+        let topics: Vec<String> =
+            topics.into_iter().filter(|topic| self.channel_named(topic).is_some()).collect();
+        let mut options = IndexedReaderOptions::new()
+            .with_record_length_limit(usize::try_from(MAX_CHUNK_BYTES).unwrap_or(usize::MAX));
+        if let Some((first, last)) = stamps {
+            options = options.starting_at(first).ending_at(last);
+        }
+        let reader = if topics.is_empty() {
+            None
+        } else {
+            let options = options.include_topics(topics);
+            Some(guarded(self.path(), "MCAP", || {
+                IndexedReader::new_with_options(&self.summary, options)
+                    .map_err(|error| Error::container(self.path(), "MCAP")(error.into()))
+            })?)
+        };
+        Ok(Messages { file: self.file.clone(), reader })
+    }
+
+    /// Rows of one message of a table.
+    pub(super) fn rows<R: Record>(&self, message: &Message, first_row: u64) -> Result<Option<Vec<R>>, Error> {
+        let Some(channel) = self
+            .channels
+            .get(R::TABLE.name)
+            .into_iter()
+            .flatten()
+            .find(|channel| channel.id == message.channel)
+        else {
+            return Ok(None);
+        };
+        guarded(self.path(), "Arrow", || {
+            let batch = decode_batch(&message.data, Arc::clone(&channel.schema)).map_err(|error| {
+                Error::Container {
+                    path: self.path().to_owned(),
+                    container: "Arrow",
+                    detail: format!("{} message at {} ns: {error}", R::TABLE.name, message.log_time),
+                }
+            })?;
+            from_batch(&batch, first_row)
+        })
+        .map(Some)
+    }
+
+    /// Reads the whole file once and checks every CRC of the container.
+    pub(super) fn verify(&self) -> Result<(), Error> {
+        let path = self.path();
+        guarded(path, "MCAP", || {
+            let failed = |error: mcap::McapError| Error::container(path, "MCAP")(error.into());
+            let options = LinearReaderOptions::default()
+                .with_emit_chunks(false)
+                .with_validate_chunk_crcs(true)
+                .with_validate_data_section_crc(true)
+                .with_validate_summary_section_crc(true)
+                .with_record_length_limit(
+                    usize::try_from(self.file.length().min(MAX_CHUNK_BYTES)).unwrap_or(usize::MAX),
+                );
+            let mut reader = LinearReader::new_with_options(options);
+            let mut offset = 0;
+            while let Some(event) = reader.next_event() {
+                match event.map_err(failed)? {
+                    LinearReadEvent::ReadRequest(need) => {
+                        let read = self.file.read_at(offset, reader.insert(need)).map_err(Error::io(path))?;
+                        offset += read as u64;
+                        reader.notify_read(read);
+                    }
+                    LinearReadEvent::Record { .. } => {}
+                }
+            }
+            Ok(())
+        })
+    }
+}
+
+/// A message and where it belongs.
+#[derive(Clone, Debug)]
+pub(super) struct Message {
+    pub(super) channel: u16,
+    pub(super) log_time: u64,
+    pub(super) data: Vec<u8>,
+}
+
+/// Messages in time order.
+pub(super) struct Messages {
+    file: CountedFile,
+    reader: Option<IndexedReader>,
+}
+
+impl Messages {
+    fn advance(&mut self) -> Result<Option<Message>, Error> {
+        let Self { file, reader } = self;
+        let Some(indexed) = reader else { return Ok(None) };
+        let path = file.path().to_owned();
+        guarded(&path, "MCAP", || {
+            let failed = |error: mcap::McapError| Error::container(file.path(), "MCAP")(error.into());
+            loop {
+                let (offset, length) = match indexed.next_event() {
+                    None => return Ok(None),
+                    Some(event) => match event.map_err(failed)? {
+                        IndexedReadEvent::Message { header, data } => {
+                            return Ok(Some(Message {
+                                channel: header.channel_id,
+                                log_time: header.log_time,
+                                data: data.to_vec(),
+                            }));
+                        }
+                        IndexedReadEvent::ReadChunkRequest { offset, length } => (offset, length),
+                    },
+                };
+                let bytes = file.read_exact_at(offset, length).map_err(Error::io(file.path()))?;
+                indexed.insert_chunk_record_data(offset, &bytes).map_err(failed)?;
+            }
+        })
+    }
+}
+
+impl Iterator for Messages {
+    type Item = Result<Message, Error>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let result = self.advance().transpose();
+        if matches!(result, Some(Err(_))) {
+            // The reader's state is not to be trusted after an error.
+            self.reader = None;
+        }
+        result
+    }
+}
+
+fn read_summary(file: &CountedFile) -> Result<Summary, Error> {
+    let path = file.path();
+    let failed = |error: mcap::McapError| Error::container(path, "MCAP")(error.into());
+    let mut magic = [0; 8];
+    let read = file.read_at(0, &mut magic).map_err(Error::io(path))?;
+    if magic[..read] != *mcap::MAGIC {
+        return Err(Error::NotASequence {
+            path: path.to_owned(),
+            found: "a file without MCAP's magic bytes".to_owned(),
+        });
+    }
+    let options = SummaryReaderOptions::default()
+        .with_file_size(file.length())
+        .with_record_length_limit(usize::try_from(file.length()).unwrap_or(usize::MAX));
+    let mut reader = SummaryReader::new_with_options(options);
+    let mut position = 0;
+    while let Some(event) = reader.next_event() {
+        match event.map_err(failed)? {
+            SummaryReadEvent::ReadRequest(need) => {
+                let read = file.read_at(position, reader.insert(need)).map_err(Error::io(path))?;
+                position += read as u64;
+                reader.notify_read(read);
+            }
+            SummaryReadEvent::SeekRequest(std::io::SeekFrom::Start(target)) => {
+                position = target;
+                reader.notify_seeked(target);
+            }
+            SummaryReadEvent::SeekRequest(std::io::SeekFrom::End(back)) => {
+                position = file.length().saturating_add_signed(back);
+                reader.notify_seeked(position);
+            }
+            SummaryReadEvent::SeekRequest(std::io::SeekFrom::Current(by)) => {
+                position = position.saturating_add_signed(by);
+                reader.notify_seeked(position);
+            }
+        }
+    }
+    match reader.finish() {
+        Some(summary) if !summary.channels.is_empty() => Ok(summary),
+        _ => Err(Error::Container {
+            path: path.to_owned(),
+            container: "MCAP",
+            detail: "no summary section: the file was cut off or written without an index".to_owned(),
+        }),
+    }
+}

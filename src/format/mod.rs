@@ -1,0 +1,38 @@
+//! The specification in code: reading and writing sequences as MCAP files and Parquet folders.
+//!
+//! ```no_run
+//! use open_structure::structure::PointMeasurement;
+//!
+//! let sequence = open_structure::format::open("box1")?;
+//! let rows: Vec<PointMeasurement> = sequence.table()?;
+//! # Ok::<(), open_structure::format::Error>(())
+//! ```
+
+mod arrow_batch;
+mod arrow_message;
+mod arrow_schema;
+mod counted_file;
+mod croissant;
+mod encoding;
+mod error;
+mod foxglove;
+mod guard;
+mod json_schema;
+mod mcap_reader;
+mod mcap_writer;
+mod names;
+mod parquet_folder;
+mod parquet_reader;
+mod parquet_writer;
+mod partial;
+mod reader;
+mod stored_table;
+mod writer;
+
+pub use arrow_schema::arrow_schema;
+pub use encoding::Encoding;
+pub use error::Error;
+pub use json_schema::json_schema;
+pub use reader::{Batches, Frames, SequenceReader, open, read};
+pub use stored_table::StoredTable;
+pub use writer::{FrameRows, SequenceWriter, WriteOptions, Written, write};

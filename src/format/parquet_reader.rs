@@ -1,0 +1,203 @@
+//! One Parquet file as a table.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
+
+use parquet::arrow::ProjectionMask;
+use parquet::arrow::arrow_reader::{
+    ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder,
+    RowSelection, RowSelector,
+};
+use parquet::file::metadata::{PageIndexPolicy, ParquetMetaData};
+use parquet::file::page_index::column_index::ColumnIndexMetaData;
+use parquet::file::statistics::Statistics;
+
+use super::Error;
+use super::arrow_batch::from_batch;
+use super::counted_file::CountedFile;
+use super::guard::guarded;
+use super::stored_table::StoredTable;
+use crate::structure::{FrameId, Record, TableInfo};
+
+/// Rows decoded at once: columns of a batch stay in the cache.
+const BATCH_ROWS: usize = 1 << 13;
+/// Largest plausible number of rows per byte of file; constant columns reach a few hundred.
+const MAX_ROWS_PER_BYTE: u64 = 1 << 12;
+
+/// A table's file, its footer read.
+pub(super) struct ParquetTableReader {
+    file: CountedFile,
+    metadata: ArrowReaderMetadata,
+    stored: StoredTable,
+}
+
+impl ParquetTableReader {
+    pub(super) fn open(
+        path: &Path,
+        table: &'static TableInfo,
+        bytes_read: Arc<AtomicU64>,
+    ) -> Result<Self, Error> {
+        let file = CountedFile::open(path, bytes_read)?;
+        // The embedded Arrow schema only repeats what the Parquet schema says, in the words of its writer.
+        let options = ArrowReaderOptions::new()
+            .with_skip_arrow_metadata(true)
+            .with_page_index_policy(PageIndexPolicy::Skip);
+        let metadata = guarded(path, "Parquet", || {
+            ArrowReaderMetadata::load(&file, options)
+                .map_err(|error| Error::container(path, "Parquet")(error.into()))
+        })?;
+        let rows = metadata.metadata().file_metadata().num_rows();
+        let rows = u64::try_from(rows).map_err(|_| Error::Container {
+            path: path.to_owned(),
+            container: "Parquet",
+            detail: format!("{rows} rows"),
+        })?;
+        let limit = file.length().saturating_mul(MAX_ROWS_PER_BYTE);
+        if rows > limit {
+            return Err(Error::TooLarge {
+                path: path.to_owned(),
+                what: "row count".to_owned(),
+                found: rows,
+                limit,
+            });
+        }
+        let stored = StoredTable::new(table, metadata.schema(), Some(rows));
+        Ok(Self { file, metadata, stored })
+    }
+
+    pub(super) fn stored(&self) -> &StoredTable {
+        &self.stored
+    }
+
+    /// The footer, as the validator wants to see it.
+    pub(super) fn footer(&self) -> &ParquetMetaData {
+        self.metadata.metadata()
+    }
+
+    /// Rows from the beginning, batch by batch.
+    pub(super) fn batches<R: Record>(&self) -> Result<ParquetBatches, Error> {
+        self.read::<R>(&self.metadata, None)
+    }
+
+    /// Only the pages that may hold rows of a frame.
+    pub(super) fn batches_of_frame<R: Record>(&self, frame_id: FrameId) -> Result<ParquetBatches, Error> {
+        let path = self.file.path();
+        let Some(column) = self.leaf("frame_id") else {
+            return self.batches::<R>();
+        };
+        let groups: Vec<usize> = (0..self.footer().num_row_groups())
+            .filter(|group| match self.footer().row_group(*group).column(column).statistics() {
+                Some(Statistics::Int64(range)) => {
+                    range.min_opt().is_none_or(|min| *min <= frame_id.0)
+                        && range.max_opt().is_none_or(|max| *max >= frame_id.0)
+                }
+                _ => true,
+            })
+            .collect();
+        if groups.is_empty() {
+            return Ok(ParquetBatches { file: self.file.clone(), reader: None, row: 0 });
+        }
+        guarded(path, "Parquet", || {
+            let options = ArrowReaderOptions::new()
+                .with_skip_arrow_metadata(true)
+                .with_page_index_policy(PageIndexPolicy::Optional);
+            let metadata = ArrowReaderMetadata::load(&self.file, options)
+                .map_err(|error| Error::container(path, "Parquet")(error.into()))?;
+            let selection = groups
+                .iter()
+                .flat_map(|group| pages(metadata.metadata(), *group, column, frame_id))
+                .collect();
+            self.read::<R>(&metadata, Some((groups.clone(), selection)))
+        })
+    }
+
+    fn leaf(&self, name: &str) -> Option<usize> {
+        let schema = self.metadata.parquet_schema();
+        (0..schema.num_columns()).find(|column| schema.column(*column).path().string() == name)
+    }
+
+    fn read<R: Record>(
+        &self,
+        metadata: &ArrowReaderMetadata,
+        part: Option<(Vec<usize>, Vec<RowSelector>)>,
+    ) -> Result<ParquetBatches, Error> {
+        let path = self.file.path();
+        guarded(path, "Parquet", || {
+            let known = metadata
+                .parquet_schema()
+                .root_schema()
+                .get_fields()
+                .iter()
+                .enumerate()
+                .filter(|(_, found)| R::TABLE.fields.iter().any(|field| field.name == found.name()))
+                .map(|(index, _)| index);
+            let mask = ProjectionMask::roots(metadata.parquet_schema(), known);
+            let mut builder =
+                ParquetRecordBatchReaderBuilder::new_with_metadata(self.file.clone(), metadata.clone())
+                    .with_batch_size(BATCH_ROWS)
+                    .with_projection(mask);
+            if let Some((groups, selection)) = part {
+                builder = builder.with_row_groups(groups).with_row_selection(RowSelection::from(selection));
+            }
+            let reader = builder.build().map_err(|error| Error::container(path, "Parquet")(error.into()))?;
+            Ok(ParquetBatches { file: self.file.clone(), reader: Some(reader), row: 0 })
+        })
+    }
+}
+
+/// Which rows of a row group lie in pages that may hold the frame.
+fn pages(metadata: &ParquetMetaData, group: usize, column: usize, frame_id: FrameId) -> Vec<RowSelector> {
+    let rows = usize::try_from(metadata.row_group(group).num_rows()).unwrap_or(0);
+    let index = metadata.page_index_for_row_group(group);
+    let (Some(ColumnIndexMetaData::INT64(ranges)), Some(locations)) =
+        (index.column_index(column), index.page_locations(column))
+    else {
+        return vec![RowSelector::select(rows)];
+    };
+    let starts: Vec<usize> = locations
+        .iter()
+        .map(|page| usize::try_from(page.first_row_index).unwrap_or(0).min(rows))
+        .chain([rows])
+        .collect();
+    starts
+        .windows(2)
+        .enumerate()
+        .map(|(page, range)| {
+            let count = range[1].saturating_sub(range[0]);
+            let may_hold = ranges.min_value(page).is_none_or(|min| *min <= frame_id.0)
+                && ranges.max_value(page).is_none_or(|max| *max >= frame_id.0);
+            if may_hold { RowSelector::select(count) } else { RowSelector::skip(count) }
+        })
+        .collect()
+}
+
+/// Rows of a table, batch by batch.
+pub(super) struct ParquetBatches {
+    file: CountedFile,
+    reader: Option<ParquetRecordBatchReader>,
+    row: u64,
+}
+
+impl ParquetBatches {
+    /// The next rows; `None` at the end.
+    pub(super) fn next_rows<R: Record>(&mut self) -> Option<Result<Vec<R>, Error>> {
+        let Self { file, reader, row } = self;
+        let path = file.path();
+        let result = guarded(path, "Parquet", || match reader.as_mut().and_then(Iterator::next) {
+            None => Ok(None),
+            Some(batch) => {
+                let batch = batch.map_err(|error| Error::container(path, "Parquet")(error.into()))?;
+                let rows: Vec<R> = from_batch(&batch, *row)?;
+                *row += rows.len() as u64;
+                Ok(Some(rows))
+            }
+        })
+        .transpose();
+        if matches!(result, Some(Err(_))) {
+            // The reader's state is not to be trusted after an error.
+            *reader = None;
+        }
+        result
+    }
+}

@@ -1,0 +1,251 @@
+//! One table as one Parquet file, encoded column chunk by column chunk.
+
+use std::fs::File;
+use std::io::{BufWriter, Sink, sink};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use arrow::array::RecordBatch;
+use arrow::compute::concat_batches;
+use arrow::datatypes::{DataType, SchemaRef};
+use parquet::arrow::arrow_writer::{
+    ArrowColumnChunk, ArrowColumnWriter, ArrowRowGroupWriterFactory, compute_leaves,
+};
+use parquet::arrow::{ArrowSchemaConverter, add_encoded_arrow_schema_to_metadata};
+use parquet::basic::{Compression, Encoding, ZstdLevel};
+use parquet::errors::ParquetError;
+use parquet::file::metadata::{KeyValue, SortingColumn};
+use parquet::file::properties::{EnabledStatistics, WriterProperties};
+use parquet::file::writer::SerializedFileWriter;
+use parquet::schema::types::ColumnPath;
+use rayon::prelude::*;
+
+use super::Error;
+use super::arrow_schema::arrow_schema;
+use crate::structure::TableInfo;
+
+/// Rows of a row group: enough to compress, few enough to hold several of them.
+pub(super) const ROW_GROUP_ROWS: usize = 1 << 18;
+/// Rows of a data page: what is read, at least, to see one frame.
+const PAGE_ROWS: usize = 1 << 13;
+/// Room for a dictionary of a whole row group of floats, so that a chunk is encoded one way throughout.
+const DICTIONARY_BYTES: usize = ROW_GROUP_ROWS * 16;
+
+/// How the values of a column chunk may be laid out; each chunk takes the one that comes out smallest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Layout {
+    /// Distinct values once, rows as references: best for values that recur.
+    Dictionary,
+    /// Bytes of all values by significance: best for noisy floats.
+    ByteStreamSplit,
+    /// Differences between neighbours: best for ascending ids.
+    Delta,
+    /// Values one after the other: best for floats of few decimals.
+    Plain,
+}
+
+impl Layout {
+    fn encoding(self) -> Encoding {
+        match self {
+            Self::Dictionary | Self::Plain => Encoding::PLAIN,
+            Self::ByteStreamSplit => Encoding::BYTE_STREAM_SPLIT,
+            Self::Delta => Encoding::DELTA_BINARY_PACKED,
+        }
+    }
+
+    /// Layouts worth trying for a column's leaf type.
+    fn candidates(data_type: &DataType) -> &'static [Self] {
+        match data_type {
+            DataType::Float64 => &[Self::Dictionary, Self::ByteStreamSplit, Self::Plain],
+            DataType::Int64 => &[Self::Dictionary, Self::Delta],
+            DataType::List(element) => Self::candidates(element.data_type()),
+            DataType::Boolean => &[Self::Plain],
+            _ => &[Self::Dictionary],
+        }
+    }
+
+    const ALL: [Self; 4] = [Self::Dictionary, Self::ByteStreamSplit, Self::Delta, Self::Plain];
+}
+
+fn properties(
+    table: &TableInfo,
+    schema: &SchemaRef,
+    layout: Layout,
+    pairs: &[(String, String)],
+) -> WriterProperties {
+    let key_values = pairs.iter().map(|(key, value)| KeyValue::new(key.clone(), value.clone())).collect();
+    // Key columns are leaves of their own, so the index of a field is the index of its leaf.
+    let sorting = table
+        .key
+        .iter()
+        .filter_map(|key| table.fields.iter().position(|field| field.name == *key))
+        .filter_map(|index| i32::try_from(index).ok())
+        .map(|column_idx| SortingColumn { column_idx, descending: false, nulls_first: false })
+        .collect();
+    let mut properties = WriterProperties::builder()
+        .set_created_by(format!("open-structure {}", env!("CARGO_PKG_VERSION")))
+        .set_compression(Compression::ZSTD(ZstdLevel::default()))
+        .set_statistics_enabled(EnabledStatistics::Page)
+        .set_data_page_row_count_limit(PAGE_ROWS)
+        .set_dictionary_page_size_limit(DICTIONARY_BYTES)
+        .set_max_row_group_row_count(Some(ROW_GROUP_ROWS))
+        .set_key_value_metadata(Some(key_values))
+        .set_sorting_columns(Some(sorting));
+    let fields =
+        schema.fields().iter().filter(|field| Layout::candidates(field.data_type()).contains(&layout));
+    for field in fields.filter(|_| layout != Layout::Dictionary) {
+        let leaf = match field.data_type() {
+            DataType::List(element) => vec![field.name().clone(), "list".to_owned(), element.name().clone()],
+            _ => vec![field.name().clone()],
+        };
+        let leaf = ColumnPath::new(leaf);
+        properties = properties
+            .set_column_dictionary_enabled(leaf.clone(), false)
+            .set_column_encoding(leaf, layout.encoding());
+    }
+    let mut properties = properties.build();
+    add_encoded_arrow_schema_to_metadata(schema, &mut properties);
+    properties
+}
+
+/// Makes column writers of one layout.
+struct LayoutFactory {
+    factory: ArrowRowGroupWriterFactory,
+    layout: Layout,
+}
+
+impl LayoutFactory {
+    fn new(table: &TableInfo, schema: &SchemaRef, layout: Layout) -> Result<Self, ParquetError> {
+        // A factory takes its properties from a file writer; this one writes nothing.
+        let root = ArrowSchemaConverter::new().convert(schema)?.root_schema_ptr();
+        let properties = Arc::new(properties(table, schema, layout, &[]));
+        let writer: SerializedFileWriter<Sink> = SerializedFileWriter::new(sink(), root, properties)?;
+        Ok(Self { factory: ArrowRowGroupWriterFactory::new(&writer, Arc::clone(schema)), layout })
+    }
+
+    fn column_writer(&self, row_group: usize, column: usize) -> Result<ArrowColumnWriter, ParquetError> {
+        self.factory
+            .create_column_writers(row_group)?
+            .into_iter()
+            .nth(column)
+            .ok_or_else(|| ParquetError::General(format!("no column {column}")))
+    }
+}
+
+/// Writes one table, a row group at a time.
+pub(super) struct ParquetTableWriter {
+    path: PathBuf,
+    schema: SchemaRef,
+    writer: SerializedFileWriter<BufWriter<File>>,
+    factories: Vec<LayoutFactory>,
+    pending: Vec<RecordBatch>,
+    pending_rows: usize,
+    row_groups: usize,
+}
+
+impl ParquetTableWriter {
+    /// Begins the file of a table; `pairs` are its key-value metadata.
+    pub(super) fn create(path: &Path, table: &TableInfo, pairs: &[(String, String)]) -> Result<Self, Error> {
+        let file = File::create(path).map_err(Error::io(path))?;
+        let schema = arrow_schema(table);
+        let make = || -> Result<_, ParquetError> {
+            let root = ArrowSchemaConverter::new().convert(&schema)?.root_schema_ptr();
+            let properties = Arc::new(properties(table, &schema, Layout::Dictionary, pairs));
+            let writer = SerializedFileWriter::new(BufWriter::new(file), root, properties)?;
+            let factories = Layout::ALL
+                .iter()
+                .map(|layout| LayoutFactory::new(table, &schema, *layout))
+                .collect::<Result<_, _>>()?;
+            Ok((writer, factories))
+        };
+        let (writer, factories) = make().map_err(|error| Error::container(path, "Parquet")(error.into()))?;
+        Ok(Self {
+            path: path.to_owned(),
+            schema,
+            writer,
+            factories,
+            pending: Vec::new(),
+            pending_rows: 0,
+            row_groups: 0,
+        })
+    }
+
+    /// Adds rows; writes whenever a row group is full. A batch has at most [`ROW_GROUP_ROWS`] rows.
+    pub(super) fn write(&mut self, batch: RecordBatch) -> Result<(), Error> {
+        let room = ROW_GROUP_ROWS - self.pending_rows;
+        if batch.num_rows() < room {
+            self.pending_rows += batch.num_rows();
+            self.pending.push(batch);
+            return Ok(());
+        }
+        let rest = batch.slice(room, batch.num_rows() - room);
+        self.pending.push(batch.slice(0, room));
+        self.flush()?;
+        if rest.num_rows() > 0 {
+            self.pending_rows = rest.num_rows();
+            self.pending.push(rest);
+        }
+        Ok(())
+    }
+
+    fn flush(&mut self) -> Result<(), Error> {
+        let batches = std::mem::take(&mut self.pending);
+        self.pending_rows = 0;
+        let failed = Error::container(&self.path, "Parquet");
+        let write = || -> Result<(), ParquetError> {
+            let batch = concat_batches(&self.schema, &batches)?;
+            drop(batches);
+            // Every column in every layout worth trying, on all cores; which one wins depends on sizes alone.
+            let chunks: Vec<ArrowColumnChunk> = (0..batch.num_columns())
+                .into_par_iter()
+                .map(|column| smallest(&self.factories, self.row_groups, &batch, column))
+                .collect::<Result<_, _>>()?;
+            let mut row_group = self.writer.next_row_group()?;
+            for chunk in chunks {
+                chunk.append_to_row_group(&mut row_group)?;
+            }
+            row_group.close()?;
+            Ok(())
+        };
+        write().map_err(|error| failed(error.into()))?;
+        self.row_groups += 1;
+        Ok(())
+    }
+
+    /// Writes what is left, and the footer.
+    pub(super) fn finish(mut self) -> Result<(), Error> {
+        if self.pending_rows > 0 {
+            self.flush()?;
+        }
+        let Self { path, writer, .. } = self;
+        writer.close().map_err(|error| Error::container(&path, "Parquet")(error.into()))?;
+        Ok(())
+    }
+}
+
+/// The column chunk in the layout that takes the fewest bytes; the first candidate wins a tie.
+fn smallest(
+    factories: &[LayoutFactory],
+    row_group: usize,
+    batch: &RecordBatch,
+    column: usize,
+) -> Result<ArrowColumnChunk, ParquetError> {
+    let schema = batch.schema();
+    let field = schema.field(column);
+    let leaves = compute_leaves(field, batch.column(column))?;
+    let mut best: Option<ArrowColumnChunk> = None;
+    for factory in
+        factories.iter().filter(|factory| Layout::candidates(field.data_type()).contains(&factory.layout))
+    {
+        let mut writer = factory.column_writer(row_group, column)?;
+        for leaf in &leaves {
+            writer.write(leaf)?;
+        }
+        let chunk = writer.close()?;
+        let bytes = |chunk: &ArrowColumnChunk| chunk.close().bytes_written;
+        if best.as_ref().is_none_or(|best| bytes(&chunk) < bytes(best)) {
+            best = Some(chunk);
+        }
+    }
+    best.ok_or_else(|| ParquetError::General(format!("no layout for column {}", field.name())))
+}

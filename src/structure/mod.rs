@@ -1,0 +1,55 @@
+//! The nouns of the specification in memory: one struct per table row, the manifest and the whole sequence.
+//!
+//! Every row struct is the single source of its JSON Schema, its Arrow schema and its table in the
+//! specification; [`Record`] and [`Field`] carry that description.
+
+mod camera;
+mod column;
+mod correspondence;
+mod digest;
+mod field;
+mod frame;
+mod frame_statistics;
+mod graph;
+mod id;
+mod landmark;
+mod manifest;
+mod map;
+mod measurement;
+mod observation;
+mod pose_row;
+mod provenance;
+mod record;
+pub mod registry;
+mod segment_row;
+mod sequence;
+mod statistics;
+mod structural_group;
+mod table;
+mod trajectory;
+
+pub use camera::{Camera, Distortion};
+pub use column::{Bitmap, ColumnSink, ColumnSource, ColumnValue, Lists, Nullable};
+pub use correspondence::{
+    LineCorrespondence, PointCorrespondence, line_correspondences, point_correspondences,
+};
+pub use digest::{ContentDigest, hex};
+pub use field::{ColumnType, Field, Need, Storage, TableInfo};
+pub use frame::Frame;
+pub use frame_statistics::FrameStatistics;
+pub use graph::{GraphFactor, GraphLine, GraphPoint, GraphPose};
+pub use id::{CameraId, FrameId, GroupId, LineId, PointId};
+pub use landmark::{Descriptor, LineLandmark, PointLandmark};
+pub use manifest::{Clock, Conventions, Manifest, Noise, TableSummary};
+pub use map::{MapLine, MapPoint};
+pub use measurement::{LineMeasurement, PointMeasurement};
+pub use observation::{LineObservation, PointObservation};
+pub use pose_row::PoseRow;
+pub use provenance::{Exclusion, Generator, Recovery, Source, SourceFile};
+pub use record::Record;
+pub use sequence::{FrameBundle, Sequence};
+pub use statistics::{CELL_SIZE_PX, frame_statistics};
+pub use structural_group::StructuralGroup;
+pub use table::{TABLES, table_info};
+pub(crate) use table::{for_each_frame_table, for_each_table};
+pub use trajectory::TrajectoryPose;

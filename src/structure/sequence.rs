@@ -1,0 +1,59 @@
+//! A whole sequence in memory, and what belongs to one of its frames.
+
+use super::manifest::Manifest;
+use super::record::Record;
+use super::table::{for_each_frame_table, for_each_table};
+use super::{
+    Camera, CameraId, Frame, FrameStatistics, GraphFactor, GraphLine, GraphPoint, GraphPose,
+    LineCorrespondence, LineLandmark, LineMeasurement, LineObservation, MapLine, MapPoint,
+    PointCorrespondence, PointLandmark, PointMeasurement, PointObservation, StructuralGroup, TrajectoryPose,
+};
+
+macro_rules! sequence {
+    ($($name:ident: $row:ident,)+) => {
+        /// A whole sequence in memory: the manifest and the rows of every table.
+        ///
+        /// A table that a file does not have is empty here.
+        #[derive(Clone, Debug, Default, PartialEq)]
+        pub struct Sequence {
+            /// What is said about the sequence as a whole.
+            pub manifest: Manifest,
+            $(
+                #[doc = concat!("Rows of the table `", stringify!($name), "`.")]
+                pub $name: Vec<$row>,
+            )+
+        }
+
+        impl Sequence {
+            /// Sorts every table into the order in which it is stored.
+            pub fn sort(&mut self) {
+                $(self.$name.sort_by(Record::compare_key);)+
+            }
+        }
+    };
+}
+for_each_table!(sequence);
+
+impl Sequence {
+    /// The camera of an id.
+    #[must_use]
+    pub fn camera(&self, camera_id: CameraId) -> Option<&Camera> {
+        self.manifest.camera(camera_id)
+    }
+}
+
+macro_rules! bundle {
+    ($($name:ident: $row:ident,)+) => {
+        /// One frame and its rows of every per-frame table.
+        #[derive(Clone, Debug, Default, PartialEq)]
+        pub struct FrameBundle {
+            /// The frame.
+            pub frame: Frame,
+            $(
+                #[doc = concat!("Its rows of the table `", stringify!($name), "`.")]
+                pub $name: Vec<$row>,
+            )+
+        }
+    };
+}
+for_each_frame_table!(bundle);

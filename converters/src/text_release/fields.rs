@@ -179,6 +179,13 @@ mod tests {
             prop_assert_eq!(number(text.as_bytes()).map(f64::to_bits), expected);
         }
 
+        /// About where the digits stop to fit into an f64.
+        #[test]
+        fn the_short_way_stops_where_it_would_round_twice(text in r"9[0-9]{6}\.[0-9]{6,12}") {
+            let expected = text.parse::<f64>().ok().map(f64::to_bits);
+            prop_assert_eq!(number(text.as_bytes()).map(f64::to_bits), expected);
+        }
+
         #[test]
         fn every_finite_number_comes_back(bits: u64) {
             let value = f64::from_bits(bits);

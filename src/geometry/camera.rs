@@ -132,8 +132,8 @@ mod tests {
         ) {
             let k = Matrix3::new(camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0);
             let (found, expected) = (camera.line_matrix() * a.cross(&b), (k * a).cross(&(k * b)));
-            // Relative to the largest product that is formed.
-            let scale = (k * a).norm() * (k * b).norm();
+            // Relative to the largest products that are formed.
+            let scale = k.norm_squared() * a.norm() * b.norm();
             prop_assert!((found - expected).norm() <= 1e-14 * scale);
         }
     }

@@ -51,14 +51,14 @@ mod tests {
 
         #[test]
         fn a_shift_across_the_line_is_the_residual(
-            camera in camera(), pose in circle(), segment in visible_segment(), shift in -9.0..9.0,
+            camera in camera(), pose in circle(), segment in visible_segment(), shift in -9.0..9.0_f64,
         ) {
             let ends = [segment.start, segment.end].map(|end| camera.project(pose * end).unwrap());
             let along = ends[1] - ends[0];
             prop_assume!(along.norm() > 1.0);
             let line = segment.plucker().unwrap();
             // In image coordinates the normal is along turned by +90 degrees, for the moment comes from start × end.
-            let across = nalgebra::Vector2::new(-along.y, along.x).normalize();
+            let across = Vector2::new(-along.y, along.x).normalize();
             let moved = [ends[0] + across * shift, ends[1] - across * shift];
             let residual = line_residual(&camera, &pose, &line, moved).unwrap();
             prop_assert!((residual - Vector2::new(shift, -shift)).norm() < 1e-9, "{residual}");

@@ -11,26 +11,26 @@ pub(super) fn is_one_place(spread: f64, offset: f64) -> bool {
     spread.is_nan() || spread <= 1e-12 * (1.0 + offset)
 }
 
-/// The widest angle between any two of `count` directions, as far as sweeps find it.
+/// The widest angle between any two of the views, as far as sweeps find it.
 ///
-/// Goes from a direction to the one farthest from it, and on from there while the angle grows: a few passes instead of all pairs. At least
-/// half of the true maximum by the triangle inequality; the maximum itself where the directions lie in a plane.
-pub(super) fn widest_angle(count: usize, angle: impl Fn(usize, usize) -> f64) -> f64 {
-    let (mut from, mut widest) = (0, 0.0);
-    loop {
-        let mut farthest = None;
-        for to in 0..count {
-            let angle = angle(from, to);
+/// Goes from a view to the one at the widest angle to it, and on from there while the angle grows: a few passes instead of all pairs. At
+/// least half of the true maximum by the triangle inequality; the maximum itself where the directions lie in a plane.
+pub(super) fn widest_angle<T: Copy>(
+    views: &(impl Iterator<Item = T> + Clone),
+    angle: impl Fn(T, T) -> f64,
+) -> f64 {
+    let mut widest = 0.0;
+    let mut from = views.clone().next();
+    while let Some(here) = from.take() {
+        for there in views.clone() {
+            let angle = angle(here, there);
             if angle > widest {
                 widest = angle;
-                farthest = Some(to);
+                from = Some(there);
             }
         }
-        match farthest {
-            Some(to) => from = to,
-            None => return widest,
-        }
     }
+    widest
 }
 
 #[cfg(test)]
@@ -53,7 +53,7 @@ mod tests {
                     all = all.max(angle(a, b));
                 }
             }
-            let found = widest_angle(rays.len(), |a, b| angle(&rays[a], &rays[b]));
+            let found = widest_angle(&rays.iter(), angle);
             prop_assert!(found <= all && found >= 0.5 * all);
         }
 
@@ -61,13 +61,13 @@ mod tests {
         fn sweeps_find_the_widest_angle_in_a_plane(turns in prop::collection::vec(0.0..1.5, 2..20)) {
             let rays: Vec<_> = turns.iter().map(|turn: &f64| Vector3::new(turn.cos(), turn.sin(), 0.0)).collect();
             let (low, high) = turns.iter().fold((9.0_f64, 0.0_f64), |(low, high), t| (low.min(*t), high.max(*t)));
-            let found = widest_angle(rays.len(), |a, b| angle(&rays[a], &rays[b]));
+            let found = widest_angle(&rays.iter(), angle);
             prop_assert!((found - (high - low)).abs() < 1e-14);
         }
     }
 
     #[test]
     fn no_direction_has_no_angle() {
-        assert_eq!(widest_angle(0, |_, _| 1.0), 0.0);
+        assert!(widest_angle(&std::iter::empty::<()>(), |(), ()| 1.0).abs() < f64::MIN_POSITIVE);
     }
 }

@@ -208,7 +208,7 @@ mod tests {
         }
 
         #[test]
-        fn the_closest_point_is_on_the_line_and_no_other_is_nearer(line in line(), p in point(), s in -9.0..9.0) {
+        fn the_closest_point_is_on_the_line_and_no_other_is_nearer(line in line(), p in point(), s in -9.0..9.0_f64) {
             let closest = line.closest_point_to(p);
             prop_assert!(line.distance_to_point(closest) < ROUNDING_M);
             prop_assert!(((closest - p).norm() - line.distance_to_point(p)).abs() < ROUNDING_M);

@@ -239,7 +239,9 @@ mod tests {
         #[test]
         fn products_associate_with_points(a in pose(), b in pose(), p in point()) {
             prop_assert!(((a * b) * p - a * (b * p)).norm() < ROUNDING_M);
-            prop_assert_eq!(&a * &b, a * b);
+            let (left, right) = (&a, &b);
+            prop_assert_eq!(left * right, a * b);
+            prop_assert_eq!(left * p, a * p);
         }
 
         #[test]

@@ -42,7 +42,7 @@ pub(super) fn line() -> impl Strategy<Value = PluckerLine> {
 
 /// A camera of 640 by 480 pixels, with `fy` of either sign.
 pub(super) fn camera() -> impl Strategy<Value = PinholeCamera> {
-    (300.0..600.0, 300.0..600.0, any::<bool>(), 300.0..340.0, 220.0..260.0).prop_map(
+    (300.0..600.0_f64, 300.0..600.0_f64, any::<bool>(), 300.0..340.0, 220.0..260.0).prop_map(
         |(fx, fy, flip, cx, cy)| {
             PinholeCamera::new(fx, if flip { -fy } else { fy }, cx, cy, 640, 480).unwrap()
         },
@@ -51,9 +51,8 @@ pub(super) fn camera() -> impl Strategy<Value = PinholeCamera> {
 
 /// A `camera_from_world` that looks at about the world's origin from 4 to 8 m.
 pub(super) fn circle() -> impl Strategy<Value = Pose> {
-    (0.0..TAU, -0.8..0.8, 4.0..8.0, 0.0..TAU, vector(0.3)).prop_map(
+    (0.0..TAU, -0.8..0.8_f64, 4.0..8.0_f64, 0.0..TAU, vector(0.3)).prop_map(
         |(azimuth, height, distance, roll, aim)| {
-            let (azimuth, height): (f64, f64) = (azimuth, height);
             let radius = (1.0 - height * height).sqrt();
             let centre = Vector3::new(radius * azimuth.cos(), radius * azimuth.sin(), height) * distance;
             let forward = (aim - centre).normalize();

@@ -5,7 +5,7 @@ use super::least_squares::{Normal, minimise};
 use super::parallax::{LEAST_PARALLAX, is_one_place, widest_angle};
 use super::{OrthonormalLine, PinholeCamera, PluckerLine, Pose};
 use nalgebra::linalg::SymmetricEigen;
-use nalgebra::{Matrix3x4, Matrix4, Point2, Point3, Vector3, Vector4};
+use nalgebra::{Matrix3x4, Matrix4, Matrix4x2, Point2, Point3, Vector3, Vector4};
 
 /// One observation of a line: camera, `camera_from_world`, start and end pixel.
 pub type LineView = (PinholeCamera, Pose, [Point2<f64>; 2]);
@@ -13,7 +13,7 @@ pub type LineView = (PinholeCamera, Pose, [Point2<f64>; 2]);
 /// A triangulated line and how well its observations agree.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LineTriangulation {
-    /// The line in the world, metres, directed as the first segment runs from start to end.
+    /// The line in the world, metres, directed as the longest segment runs from start to end.
     pub line: PluckerLine,
     /// Root mean square of all residuals (distances of segment ends from the line's image), two to an observation, pixels.
     pub rms_px: f64,
@@ -29,8 +29,8 @@ pub struct LineTriangulation {
 ///
 /// `min Σ |r_l|²`, `r_l` as in [`line_residual`](super::line_residual)
 ///
-/// Starts from the line in which the planes through cameras and segments meet (the two least eigenvectors of their sum `Σ π πᵀ`) and
-/// iterates in the orthonormal form.
+/// Iterates in the orthonormal form from three linear solutions over `Σ π πᵀ`, the sum of the planes through cameras and segments, and keeps
+/// the best end: one start is nearly exact without noise, two are not drawn towards the cameras by noise when the parallax is small.
 ///
 /// * `observations` — camera, pose of the world in the camera (metres), both ends of the segment (pixels). Ends need not match between
 ///   observations, nor their order.
@@ -44,40 +44,40 @@ pub struct LineTriangulation {
 pub fn triangulate_line(observations: &[LineView]) -> Option<LineTriangulation> {
     let used = || observations.iter().filter(|view| has_length(view));
     let count = used().count();
-    let first = used().next()?;
-    let centre = centre_of(&first.1);
+    // The longest segment names its plane best. Its camera is the origin, for a line it sees passes at a distance.
+    let reference = used().max_by(|a, b| length_px(a).total_cmp(&length_px(b)))?;
+    let centre = centre_of(&reference.1);
     let spread = used().map(|view| (centre_of(&view.1) - centre).norm()).fold(0.0, f64::max);
     if count < 2 || is_one_place(spread, centre.coords.norm()) {
         return None;
     }
 
-    // The first camera is the origin, for a line it sees passes at a distance, which becomes the unit of length.
-    let coarse = meet(observations, &Gauge { centre, unit_m: spread })?;
-    let gauge = Gauge { centre, unit_m: spread * coarse.moment.norm() };
-    let start =
-        meet(observations, &gauge).unwrap_or(PluckerLine { moment: coarse.moment.normalize(), ..coarse });
-    let distances = |line: &OrthonormalLine| distances(observations, &gauge, line);
-    let (form, normal) = minimise(start.orthonormal(), distances, OrthonormalLine::update)?;
+    let planes = sum_of_planes(observations, &Gauge { centre, unit_m: spread })?;
+    let in_front = |line: &PluckerLine| 2 * used().filter(|view| is_in_front(view, line)).count() >= count;
+    let (mut line, cost) =
+        [by_rays(&planes, reference), by_one_depth(&planes, reference), by_eigenvectors(&planes)]
+            .into_iter()
+            .flatten()
+            .filter_map(|start| {
+                // The line's distance becomes the unit of length, so that turning and moving it are of one size.
+                let gauge = Gauge { centre, unit_m: spread * start.moment.norm() };
+                let start = PluckerLine { moment: start.moment.normalize(), ..start };
+                let distances = |line: &OrthonormalLine| distances(observations, &gauge, line);
+                let (form, normal) = minimise(start.orthonormal(), distances, OrthonormalLine::update)?;
+                Some((gauge.to_world(&form.plucker()), normal.cost))
+            })
+            .filter(|(line, cost)| cost.is_finite() && is_finite(line) && in_front(line))
+            .min_by(|a, b| a.1.total_cmp(&b.1))?;
 
-    let mut line = gauge.to_world(&form.plucker());
-    if line.moment.iter().chain(line.direction.iter()).any(|number| !number.is_finite()) {
-        return None;
-    }
-    if line.transformed(&first.1).moment.dot(&plane_normal(first)) < 0.0 {
+    if line.transformed(&reference.1).moment.dot(&plane_normal(reference)) < 0.0 {
         line = PluckerLine { moment: -line.moment, direction: -line.direction };
     }
-    let behind = used().filter(|view| !is_in_front(view, &line)).count();
-    if 2 * behind > count {
-        return None;
-    }
     let plane = |view: &LineView| {
-        (line.closest_point_to(centre_of(&view.1)) - centre_of(&view.1)).cross(&line.direction)
+        let centre = centre_of(&view.1);
+        (line.closest_point_to(centre) - centre).cross(&line.direction)
     };
-    let parallax = widest_angle(observations.len(), |a, b| {
-        let (a, b) = (&observations[a], &observations[b]);
-        if has_length(a) && has_length(b) { unsigned_angle(&plane(a), &plane(b)) } else { 0.0 }
-    });
-    let rms_px = (normal.cost / count as f64).sqrt();
+    let parallax = widest_angle(&used(), |a, b| unsigned_angle(&plane(a), &plane(b)));
+    let rms_px = (cost / count as f64).sqrt();
     let skipped = observations.len() - count;
     (parallax >= LEAST_PARALLAX).then_some(LineTriangulation { line, rms_px, parallax, count, skipped })
 }
@@ -113,6 +113,16 @@ fn centre_of(camera_from_world: &Pose) -> Point3<f64> {
     Point3::from(camera_from_world.inverse().translation())
 }
 
+/// Whether all six numbers are finite.
+fn is_finite(line: &PluckerLine) -> bool {
+    line.moment.iter().chain(&line.direction).all(|number| number.is_finite())
+}
+
+/// Length of a segment, pixels.
+fn length_px((_, _, [start, end]): &LineView) -> f64 {
+    (end - start).norm()
+}
+
 /// Normal of the plane through camera and segment, in the camera; its length is about the segment's, in focal lengths.
 fn plane_normal((camera, _, [start, end]): &LineView) -> Vector3<f64> {
     camera.normalised(*start).cross(&camera.normalised(*end))
@@ -127,8 +137,8 @@ fn is_in_front(view: &LineView, line: &PluckerLine) -> bool {
     ray.cross(&in_camera.direction).dot(&in_camera.moment) > 0.0
 }
 
-/// The line in which the planes of all segments meet, in the gauge; `None` when they are all one plane, or meet at infinity.
-fn meet(observations: &[LineView], gauge: &Gauge) -> Option<PluckerLine> {
+/// `Σ π πᵀ` over the planes of all segments, in the gauge; `None` when it is not finite.
+fn sum_of_planes(observations: &[LineView], gauge: &Gauge) -> Option<Matrix4<f64>> {
     let mut sum = Matrix4::<f64>::zeros();
     for view in observations.iter().filter(|view| has_length(view)) {
         let normal_in_camera = plane_normal(view);
@@ -136,10 +146,14 @@ fn meet(observations: &[LineView], gauge: &Gauge) -> Option<PluckerLine> {
         let plane = normal.push(normal_in_camera.dot(&gauge.translation(&view.1)));
         sum.ger(1.0, &plane, &plane, 1.0);
     }
-    if !sum.iter().all(|entry| entry.is_finite()) {
-        return None;
-    }
-    let eigen = SymmetricEigen::try_new(sum, f64::EPSILON, 200)?;
+    sum.iter().all(|entry| entry.is_finite()).then_some(sum)
+}
+
+/// The line through the two homogeneous points that miss the planes least: the two least eigenvectors.
+///
+/// `None` when all planes are one, or meet at infinity.
+fn by_eigenvectors(planes: &Matrix4<f64>) -> Option<PluckerLine> {
+    let eigen = SymmetricEigen::try_new(*planes, f64::EPSILON, 200)?;
     let mut order = [0, 1, 2, 3];
     order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
     // The squared sine of 1e-6 rad is 1e-12; under 1e-14 the second plane is rounding.
@@ -147,10 +161,36 @@ fn meet(observations: &[LineView], gauge: &Gauge) -> Option<PluckerLine> {
         return None;
     }
     let [a, b] = [order[0], order[1]].map(|column| eigen.eigenvectors.column(column).into_owned());
-    let moment = a.xyz().cross(&b.xyz());
-    let direction = b.xyz() * a.w - a.xyz() * b.w;
-    let line = PluckerLine::new(moment, direction).ok()?;
-    // A line through the origin would be one through the first camera, which has no image.
+    join(&a, &b)
+}
+
+/// The line through one point on the ray of each end of the reference segment, at the inverse depth that misses the planes least.
+///
+/// The point is `(r + α m, ρ)` with the ray `r`, the normal `m` of the reference's own plane, and `α`, `ρ` from linear least squares.
+fn by_rays(planes: &Matrix4<f64>, reference: &LineView) -> Option<PluckerLine> {
+    let across = (reference.1.rotation().inverse() * plane_normal(reference)).normalize().push(0.0);
+    let by = Matrix4x2::from_columns(&[across, Vector4::w()]);
+    let system = by.tr_mul(&(planes * by)).cholesky()?;
+    let [start, end] = rays(reference).map(|ray| ray - by * system.solve(&by.tr_mul(&(planes * ray))));
+    join(&start, &end)
+}
+
+/// As [`by_rays`], with one inverse depth for both ends: all that short segments can tell.
+fn by_one_depth(planes: &Matrix4<f64>, reference: &LineView) -> Option<PluckerLine> {
+    let [start, end] = rays(reference);
+    let depth = Vector4::w() * (-(planes * (start + end)).w / (2.0 * planes.m44));
+    join(&(start + depth), &(end + depth))
+}
+
+/// The rays of both ends of a segment, as homogeneous points at infinity with the axes of the world.
+fn rays((camera, camera_from_world, ends): &LineView) -> [Vector4<f64>; 2] {
+    let world_from_camera = camera_from_world.rotation().inverse();
+    ends.map(|pixel| (world_from_camera * camera.normalised(pixel)).push(0.0))
+}
+
+/// The line through two homogeneous points; `None` when it is at infinity or passes through the origin, the reference camera.
+fn join(a: &Vector4<f64>, b: &Vector4<f64>) -> Option<PluckerLine> {
+    let line = PluckerLine::new(a.xyz().cross(&b.xyz()), b.xyz() * a.w - a.xyz() * b.w).ok()?;
     (line.moment.norm() > 1e-12).then_some(line)
 }
 

@@ -61,7 +61,7 @@ pub fn triangulate_point(observations: &[PointView]) -> Option<Triangulation> {
     }
     let ray = |view: &PointView| point - view.1.inverse() * Point3::origin();
     let count = observations.len();
-    let parallax = widest_angle(count, |a, b| angle(&ray(&observations[a]), &ray(&observations[b])));
+    let parallax = widest_angle(&observations.iter(), |a, b| angle(&ray(a), &ray(b)));
     let rms_px = (normal.cost / count as f64).sqrt();
     (parallax >= LEAST_PARALLAX).then_some(Triangulation { point, rms_px, parallax, count })
 }

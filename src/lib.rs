@@ -1,5 +1,7 @@
 //! Measurements instead of images: the Open-Structure format, its validator and its tools.
 
+#[cfg(feature = "cli")]
+pub mod cli;
 pub mod format;
 pub mod geometry;
 pub mod structure;

@@ -1,2 +1,7 @@
-//! The program `os`.
-fn main() {}
+//! The program `os`: see `os --help`.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    open_structure::cli::main()
+}

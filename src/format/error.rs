@@ -7,12 +7,12 @@ use std::path::PathBuf;
 #[non_exhaustive]
 pub enum Error {
     /// The operating system refused.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {cause}", path.display())]
     Io {
         /// File or folder concerned.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        cause: std::io::Error,
     },
     /// The path is neither an MCAP file nor a Parquet folder of this format.
     #[error("{}: not an Open-Structure sequence: {found}; expected an .mcap file or a folder with sequence.json", path.display())]
@@ -151,7 +151,7 @@ pub enum Error {
 impl Error {
     pub(super) fn io(path: &std::path::Path) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.to_owned();
-        |source| Self::Io { path, source }
+        |cause| Self::Io { path, cause }
     }
 
     pub(super) fn container(

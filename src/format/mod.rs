@@ -11,6 +11,7 @@
 mod arrow_batch;
 mod arrow_message;
 mod arrow_schema;
+mod copy;
 mod counted_file;
 mod croissant;
 mod encoding;
@@ -30,6 +31,7 @@ mod stored_table;
 mod writer;
 
 pub use arrow_schema::arrow_schema;
+pub use copy::copy;
 pub use encoding::Encoding;
 pub use error::Error;
 pub use json_schema::json_schema;

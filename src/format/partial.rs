@@ -25,7 +25,7 @@ impl Partial {
         }
         let name = target.file_name().ok_or_else(|| Error::Io {
             path: target.to_owned(),
-            source: io::Error::new(io::ErrorKind::InvalidInput, "the output has no file name"),
+            cause: io::Error::new(io::ErrorKind::InvalidInput, "the output has no file name"),
         })?;
         let parent =
             target.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));

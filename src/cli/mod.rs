@@ -1,0 +1,96 @@
+//! The command line: arguments in, calls to the rooms below, rendering out.
+
+mod cat;
+mod completions;
+mod convert;
+mod copy;
+mod info;
+mod man;
+mod progress;
+mod schema;
+mod text;
+
+use std::io::{self, IsTerminal, Write};
+use std::process::ExitCode;
+
+use clap::{CommandFactory, Parser, Subcommand};
+
+/// Measurements instead of images: tools for Open-Structure sequences.
+///
+/// A sequence is an MCAP file (NAME.mcap) or a Parquet folder (NAME/ with sequence.json). Every
+/// command reads both; the name of an output decides which is written.
+#[derive(Parser, Debug)]
+#[command(
+    name = "os",
+    version,
+    propagate_version = true,
+    arg_required_else_help = true,
+    after_help = "Exit codes: 0 done, 1 failed, 2 misused, 3 done with findings."
+)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    Info(info::Args),
+    Cat(cat::Args),
+    Copy(copy::Args),
+    Schema(schema::Args),
+    Convert(convert::Args),
+    Completions(completions::Args),
+    Man(man::Args),
+}
+
+/// How a command ended, if it did not fail.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Outcome {
+    /// Everything was done.
+    Done,
+    /// Everything was done, and something was found.
+    Findings,
+    /// Another program ended with this code.
+    Code(u8),
+}
+
+/// Runs the program with the arguments of the process.
+#[must_use]
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let mut stdout = io::BufWriter::new(io::stdout().lock());
+    let result = match &cli.command {
+        Command::Info(args) => info::run(args, &mut stdout),
+        Command::Cat(args) => cat::run(args, &mut stdout),
+        Command::Copy(args) => copy::run(args, &mut stdout),
+        Command::Schema(args) => schema::run(args, &mut stdout),
+        Command::Convert(args) => convert::run(args),
+        Command::Completions(args) => completions::run(args, &mut stdout),
+        Command::Man(args) => man::run(args, &mut stdout),
+    };
+    let result = result.and_then(|outcome| Ok(stdout.flush().map(|()| outcome)?));
+    match result {
+        Ok(Outcome::Done) => ExitCode::SUCCESS,
+        Ok(Outcome::Findings) => ExitCode::from(3),
+        Ok(Outcome::Code(code)) => ExitCode::from(code),
+        // Whoever reads our output has seen enough, as `head` does.
+        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            let red = if io::stderr().is_terminal() { ("\u{1b}[1;31m", "\u{1b}[0m") } else { ("", "") };
+            let _ = writeln!(io::stderr(), "{}error{}: {error:#}", red.0, red.1);
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn is_broken_pipe(error: &anyhow::Error) -> bool {
+    error
+        .chain()
+        .filter_map(|cause| cause.downcast_ref::<io::Error>())
+        .any(|cause| cause.kind() == io::ErrorKind::BrokenPipe)
+}
+
+/// The program as clap describes it, for completions and man pages.
+fn program() -> clap::Command {
+    Cli::command()
+}

@@ -1,0 +1,55 @@
+//! A progress bar for work that takes over a second, on terminals alone.
+
+use std::io::{self, IsTerminal};
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// Work shorter than this shows no bar.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// A bar that appears when the work turns out to be long.
+pub(super) struct Progress {
+    what: String,
+    unit: &'static str,
+    begun: Instant,
+    bar: Mutex<Option<ProgressBar>>,
+}
+
+impl Progress {
+    /// Work on something, counted in a unit.
+    pub(super) fn new(what: impl Into<String>, unit: &'static str) -> Self {
+        Self { what: what.into(), unit, begun: Instant::now(), bar: Mutex::new(None) }
+    }
+
+    /// Tells how far the work is.
+    pub(super) fn update(&self, done: u64, total: u64) {
+        if self.begun.elapsed() < PATIENCE || !io::stderr().is_terminal() {
+            return;
+        }
+        let Ok(mut bar) = self.bar.lock() else { return };
+        let bar = bar.get_or_insert_with(|| {
+            let bar = ProgressBar::new(total);
+            let template = format!(
+                "{{msg}} {{wide_bar}} {{human_pos}}/{{human_len}} {} ({{per_sec}}, {{eta}} left)",
+                self.unit
+            );
+            if let Ok(style) = ProgressStyle::with_template(&template) {
+                bar.set_style(style);
+            }
+            bar.set_message(self.what.clone());
+            bar
+        });
+        bar.set_length(total);
+        bar.set_position(done);
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        if let Ok(Some(bar)) = self.bar.get_mut().map(|bar| bar.take()) {
+            bar.finish_and_clear();
+        }
+    }
+}

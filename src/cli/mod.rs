@@ -58,6 +58,11 @@ enum Outcome {
 #[must_use]
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
+    // Without a handler an interrupted program merely leaves a temporary file behind.
+    let _ = ctrlc::set_handler(|| {
+        crate::format::discard_unfinished();
+        std::process::exit(130);
+    });
     let mut stdout = io::BufWriter::new(io::stdout().lock());
     let result = match &cli.command {
         Command::Info(args) => info::run(args, &mut stdout),

@@ -35,6 +35,7 @@ pub use copy::copy;
 pub use encoding::Encoding;
 pub use error::Error;
 pub use json_schema::json_schema;
+pub use partial::discard_unfinished;
 pub use reader::{Batches, Frames, SequenceReader, open, read};
 pub use stored_table::StoredTable;
 pub use writer::{FrameRows, SequenceWriter, WriteOptions, Written, write};

@@ -1,10 +1,23 @@
 //! Output under a temporary name until it is whole.
 
+use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use super::Error;
+
+/// Temporary names that are in use, for [`discard_unfinished`].
+static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+/// Removes every unfinished output of this process: what a program does when it is interrupted.
+pub fn discard_unfinished() {
+    for path in UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).iter() {
+        // Nothing more can be done about a temporary file that cannot be removed.
+        let _ = remove(path);
+    }
+}
 
 /// A file or folder that gets its final name when it is finished, and vanishes when it is not.
 ///
@@ -31,6 +44,7 @@ impl Partial {
             target.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
         fs::create_dir_all(parent).map_err(Error::io(parent))?;
         let temporary = parent.join(format!(".{}.{}.partial", name.to_string_lossy(), std::process::id()));
+        UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).insert(temporary.clone());
         Ok(Self { target: target.to_owned(), temporary, finished: false, force })
     }
 
@@ -93,5 +107,6 @@ impl Drop for Partial {
             // Nothing more can be done about a temporary file that cannot be removed.
             let _ = remove(&self.temporary);
         }
+        UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).remove(&self.temporary);
     }
 }

@@ -64,7 +64,9 @@ impl McapReader {
         listed.sort_by(|left, right| left.topic.cmp(&right.topic).then(left.id.cmp(&right.id)));
         for channel in listed {
             let topic = channel.topic.as_str();
-            if topic == names::MANIFEST_TOPIC || topic == names::SUMMARY_TOPIC {
+            // Topics for viewers say nothing that the tables do not say.
+            let for_viewers = topic.starts_with(names::FOXGLOVE_PREFIX);
+            if topic == names::MANIFEST_TOPIC || topic == names::SUMMARY_TOPIC || for_viewers {
                 continue;
             }
             let Some(table) = topic.strip_prefix('/').and_then(table_info) else {

@@ -70,7 +70,7 @@ impl McapWriter {
         Ok(this)
     }
 
-    fn failed(&self, error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Error {
+    pub(super) fn failed(&self, error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Error {
         Error::container(&self.path, "MCAP")(error.into())
     }
 
@@ -79,13 +79,14 @@ impl McapWriter {
         &mut self,
         topic: &str,
         message_encoding: &str,
-        schema: impl FnOnce(&Self) -> Result<(String, &'static str, Vec<u8>), Error>,
+        schema: impl FnOnce(&Self) -> Result<(String, String, Vec<u8>), Error>,
     ) -> Result<(), Error> {
         if self.channels.contains_key(topic) {
             return Ok(());
         }
         let (name, encoding, data) = schema(self)?;
-        let schema_id = self.writer.add_schema(&name, encoding, &data).map_err(|error| self.failed(error))?;
+        let schema_id =
+            self.writer.add_schema(&name, &encoding, &data).map_err(|error| self.failed(error))?;
         let id = self
             .writer
             .add_channel(schema_id, topic, message_encoding, &BTreeMap::new())
@@ -98,7 +99,7 @@ impl McapWriter {
     pub(super) fn declare(&mut self, table: &'static TableInfo) -> Result<(), Error> {
         self.channel(&table.topic(), names::ARROW_ENCODING, |this| {
             let data = this.encoder.schema(&arrow_schema(table)).map_err(|error| this.failed(error))?;
-            Ok((format!("{}{}", names::SCHEMA_PREFIX, table.record), names::ARROW_ENCODING, data))
+            Ok((format!("{}{}", names::SCHEMA_PREFIX, table.record), names::ARROW_ENCODING.to_owned(), data))
         })
     }
 
@@ -123,7 +124,8 @@ impl McapWriter {
     ) -> Result<(), Error> {
         self.channel(topic, names::JSON_ENCODING, |_| {
             let schema = json_schema(name).unwrap_or_default();
-            Ok((format!("{}{name}", names::SCHEMA_PREFIX), names::JSON_SCHEMA_ENCODING, schema.into_bytes()))
+            let name = format!("{}{name}", names::SCHEMA_PREFIX);
+            Ok((name, names::JSON_SCHEMA_ENCODING.to_owned(), schema.into_bytes()))
         })?;
         let bytes = serde_json::to_vec(record).map_err(|error| self.failed(error))?;
         self.write_message(topic, stamp, &bytes)

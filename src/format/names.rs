@@ -15,6 +15,8 @@ pub(super) const JSON_ENCODING: &str = "json";
 pub(super) const JSON_SCHEMA_ENCODING: &str = "jsonschema";
 /// Prefix of MCAP schema names.
 pub(super) const SCHEMA_PREFIX: &str = "open_structure.";
+/// Prefix of the MCAP topics that are for viewers alone.
+pub(super) const FOXGLOVE_PREFIX: &str = "/foxglove/";
 /// Manifest of a Parquet folder.
 pub(super) const MANIFEST_FILE: &str = "sequence.json";
 /// Croissant description of a Parquet folder.

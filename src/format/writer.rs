@@ -123,9 +123,8 @@ impl SequenceWriter {
         let encoding = options.encoding.unwrap_or_else(|| Encoding::of_output(path));
         let (backend, foxglove) = match encoding {
             Encoding::Mcap => {
-                let mut writer = McapWriter::create(path, manifest, first_stamp, options.force)?;
-                let foxglove =
-                    options.foxglove.then(|| FoxgloveChannels::create(&mut writer, manifest)).transpose()?;
+                let writer = McapWriter::create(path, manifest, first_stamp, options.force)?;
+                let foxglove = options.foxglove.then(|| FoxgloveChannels::new(manifest));
                 (Backend::Mcap(Box::new(writer)), foxglove)
             }
             Encoding::Parquet => {
@@ -213,8 +212,9 @@ impl SequenceWriter {
                 Error::UnknownFrame { table, row: 0, frame: frame_id.0 }
             });
         };
-        self.next_frame += offset + 1;
-        let frame = self.frames[self.next_frame - 1].clone();
+        self.show_frames_without_rows(self.next_frame + offset)?;
+        let frame = self.frames[self.next_frame].clone();
+        self.next_frame += 1;
 
         macro_rules! each {
             ($($name:ident: $row:ident,)+) => { $(self.append_frame_table::<$row>(&frame, rows.$name)?;)+ };
@@ -223,6 +223,18 @@ impl SequenceWriter {
         if let (Some(foxglove), Backend::Mcap(writer)) = (&self.foxglove, &mut self.backend) {
             foxglove.write_frame(writer, &frame, rows)?;
         }
+        Ok(())
+    }
+
+    /// Shows viewers the frames up to an index that were passed over: the camera moves through them too.
+    fn show_frames_without_rows(&mut self, end: usize) -> Result<(), Error> {
+        let passed = &self.frames[self.next_frame..end];
+        if let (Some(foxglove), Backend::Mcap(writer)) = (&self.foxglove, &mut self.backend) {
+            for frame in passed {
+                foxglove.write_frame(writer, frame, FrameRows::default())?;
+            }
+        }
+        self.next_frame = end;
         Ok(())
     }
 
@@ -314,7 +326,7 @@ impl SequenceWriter {
             };
         }
         for_each_table!(each);
-        if let (Some(foxglove), Backend::Mcap(writer)) = (&self.foxglove, &mut self.backend) {
+        if let (Some(foxglove), Backend::Mcap(writer)) = (&mut self.foxglove, &mut self.backend) {
             let first_stamp = self.frames.first().map_or(0, |frame| stamp(frame.stamp_nanos));
             foxglove.write_scene(writer, first_stamp)?;
         }
@@ -329,6 +341,7 @@ impl SequenceWriter {
         if self.next_frame == 0 {
             self.finish_whole_tables()?;
         }
+        self.show_frames_without_rows(self.frames.len())?;
         let mut summaries = Vec::new();
         macro_rules! each {
             ($($name:ident: $row:ident,)+) => {

@@ -23,11 +23,13 @@ def matrix(translation: Any, q: Any) -> np.ndarray:
     """The 4x4 matrix of a translation and a unit quaternion."""
     x, y, z, w = q.x, q.y, q.z, q.w
     assert abs(x * x + y * y + z * z + w * w - 1) < 1e-12
-    rotation = np.array([
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ])
+    rotation = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
     moved = np.eye(4)
     moved[:3, :3], moved[:3, 3] = rotation, [translation.x, translation.y, translation.z]
     return moved
@@ -145,7 +147,9 @@ def main(path: Path, rows: dict[str, list[expected.Row]]) -> None:
         camera_from_world = np.linalg.inv(matrix(transform.translation, transform.rotation))
         observed = of_frame("point_observations")
         if observed:
-            seen = project(calibration, camera_from_world, points[[point_index[o["point_id"]] for o in observed]])
+            seen = project(
+                calibration, camera_from_world, points[[point_index[o["point_id"]] for o in observed]]
+            )
             wanted = np.array([[row["u"], row["v"]] for row in observed]) + shift
             assert np.abs(seen - wanted).max() < CLOUD_TOLERANCE_PX
             frames_drawn += 1
@@ -165,7 +169,8 @@ def main(path: Path, rows: dict[str, list[expected.Row]]) -> None:
             # Each decoder makes classes of its own, so the bytes are compared.
             assert pose.position.SerializeToString() == transform.translation.SerializeToString()
             assert pose.orientation.SerializeToString() == transform.rotation.SerializeToString()
-    print(f"{sum(map(len, messages.values()))} messages on {len(messages)} topics, {frames_drawn} frames drawn")
+    count = sum(map(len, messages.values()))
+    print(f"{count} messages on {len(messages)} topics, {frames_drawn} frames drawn")
 
 
 if __name__ == "__main__":

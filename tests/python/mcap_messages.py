@@ -4,6 +4,7 @@ import json
 import sys
 from collections import defaultdict
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 from jsonschema import Draft202012Validator
@@ -13,6 +14,15 @@ from pyarrow import ipc
 import expected
 
 PER_FRAME = {"point_observations", "line_observations", "point_measurements", "line_measurements"}
+
+
+def check_for_viewers(schema: Any) -> None:
+    """Foxglove and Lichtblick parse schemas without references, unions and lists of types."""
+    if isinstance(schema, dict):
+        assert not {"$ref", "anyOf", "oneOf", "allOf"} & set(schema), schema
+        assert isinstance(schema.get("type", ""), str | dict), schema
+    for part in schema.values() if isinstance(schema, dict) else schema if isinstance(schema, list) else []:
+        check_for_viewers(part)
 
 
 def check_container(path: Path, manifest: dict) -> None:
@@ -57,6 +67,7 @@ def main(path: Path, rows: dict[str, list[expected.Row]], schema_folder: Path) -
     validators = {name: Draft202012Validator(schema) for name, schema in schemas.items()}
     for schema in schemas.values():
         Draft202012Validator.check_schema(schema)
+        check_for_viewers(schema)
     # Every row, written as JSON, satisfies the schema of its table.
     for table, table_rows in rows.items():
         for row in table_rows:

@@ -25,7 +25,9 @@ def run(*command: str | Path) -> str:
 
 
 def doctor(path: Path) -> str:
-    report = [json.loads(line) for line in run("pymcap-cli", "doctor", path, "--format", "jsonl").splitlines()]
+    report = [
+        json.loads(line) for line in run("pymcap-cli", "doctor", path, "--format", "jsonl").splitlines()
+    ]
     assert report, "the doctor says something"
     summary = report.pop()
     assert summary["type"] == "summary" and summary["complete"] and summary["errors"] == 0, report

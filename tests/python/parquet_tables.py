@@ -115,10 +115,12 @@ def main(folder: Path, rows: dict[str, list[expected.Row]], schema_folder: Path)
         check_floats(path)
     # All tables at once, as DuckDB users write it.
     [(count,)] = duckdb.sql(
-        f"SELECT count(*) FROM '{folder}/point_measurements.parquet' JOIN '{folder}/frames.parquet' USING (frame_id)"
+        f"""SELECT count(*) FROM '{folder}/point_measurements.parquet'
+            JOIN '{folder}/frames.parquet' USING (frame_id)"""
     ).fetchall()
     assert count == len(rows["point_measurements"])
-    print(f"{len(rows)} tables, {sum(map(len, rows.values()))} rows equal, encodings {dict(sorted(encodings.items()))}")
+    count = sum(map(len, rows.values()))
+    print(f"{len(rows)} tables, {count} rows equal, encodings {dict(sorted(encodings.items()))}")
 
 
 if __name__ == "__main__":

@@ -34,7 +34,9 @@ def residuals(folder: Path, cameras: list[dict], kind: str) -> tuple[np.ndarray,
     """Residuals of points and, for both ends, of lines; n x 3: pixels, pixels, metres."""
     tables = {path.stem: pl.read_parquet(path) for path in folder.glob("*.parquet")}
     frames = tables["frames"].drop_nulls("world_from_camera_tx")
-    points = tables[f"point_{kind}"].join(tables["point_landmarks"], on="point_id").join(frames, on="frame_id")
+    points = (
+        tables[f"point_{kind}"].join(tables["point_landmarks"], on="point_id").join(frames, on="frame_id")
+    )
     point_residuals = project(points, cameras, "x", "y", "z") - points.select("u", "v", "depth").to_numpy()
     lines = tables[f"line_{kind}"].join(tables["line_landmarks"], on="line_id").join(frames, on="frame_id")
     seen = [lines.select(f"{end}_u", f"{end}_v", f"{end}_depth").to_numpy() for end in ("start", "end")]
@@ -58,7 +60,8 @@ def main(folder: Path) -> None:
         assert 0.3 < np.abs(line[:, :2]).max() <= 0.71
         assert np.isnan(point[:, 2]).any() and not np.isnan(point[:, 2]).all()
     exact = residuals(folder, manifest["cameras"], "observations")
-    print(f"{len(exact[0])} points and {len(exact[1])} line ends within {max(np.abs(e).max() for e in exact):.1e} px")
+    largest = max(np.abs(each).max() for each in exact)
+    print(f"{len(exact[0])} points and {len(exact[1])} line ends within {largest:.1e} px")
 
 
 if __name__ == "__main__":

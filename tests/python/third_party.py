@@ -14,7 +14,11 @@ import polars as pl
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-LEFT_OUT = {"point_landmarks": ["descriptor"], "point_observations": ["depth"], "graph_factors": ["information"]}
+LEFT_OUT = {
+    "point_landmarks": ["descriptor"],
+    "point_observations": ["depth"],
+    "graph_factors": ["information"],
+}
 
 
 def main(tool: str, folder: Path, output: Path) -> None:

@@ -27,8 +27,8 @@ const LIBRARIES: &[(&[&str], &[&str], &str)] = &[
         "files are the business of the room `format`",
     ),
     (
-        &["clap", "clap_complete", "clap_mangen", "comfy_table", "anyhow", "indicatif"],
-        &["src/cli/", "src/main.rs", "converters/src/cli", "converters/src/main.rs"],
+        &["clap", "clap_complete", "clap_mangen", "comfy_table", "anyhow", "indicatif", "ctrlc"],
+        &["src/cli/", "src/main.rs", "converters/src/command", "converters/src/main.rs"],
         "a library neither parses arguments nor talks to people",
     ),
 ];

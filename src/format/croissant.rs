@@ -42,6 +42,8 @@ pub(super) fn croissant(folder: &Path, manifest: &Manifest) -> Result<String, Er
             description[key] = Value::from(value.as_str());
         }
     }
+    // Sorted by key already, unless some crate asks `serde_json` to keep the order of insertion.
+    description.sort_all_objects();
     let mut text = serde_json::to_string_pretty(&description).unwrap_or_default();
     text.push('\n');
     Ok(text)

@@ -21,6 +21,7 @@ mod guard;
 mod json_schema;
 mod mcap_reader;
 mod mcap_writer;
+mod member_names;
 mod names;
 mod parquet_folder;
 mod parquet_reader;

@@ -18,16 +18,22 @@ pub struct Camera {
     /// Camera model; the registry has `pinhole`.
     pub model: String,
     /// Image width, pixels.
+    #[schemars(extend("x-unit" = "px"))]
     pub width: u32,
     /// Image height, pixels.
+    #[schemars(extend("x-unit" = "px"))]
     pub height: u32,
     /// Horizontal focal length, pixels.
+    #[schemars(extend("x-unit" = "px"))]
     pub fx: f64,
     /// Vertical focal length, pixels; negative for a camera whose y axis points up in the image.
+    #[schemars(extend("x-unit" = "px"))]
     pub fy: f64,
     /// Column of the principal point, pixels.
+    #[schemars(extend("x-unit" = "px"))]
     pub cx: f64,
     /// Row of the principal point, pixels.
+    #[schemars(extend("x-unit" = "px"))]
     pub cy: f64,
     /// Axes of `camera` space: `right-down-forward`, or `right-up-forward` where `fy` is negative.
     pub axes: String,
@@ -38,9 +44,11 @@ pub struct Camera {
     pub removed_distortion: Option<Distortion>,
     /// Smallest depth that the sensor gives, metres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-unit" = "m"))]
     pub depth_min: Option<f64>,
     /// Largest depth that the sensor gives, metres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-unit" = "m"))]
     pub depth_max: Option<f64>,
 }
 

@@ -86,6 +86,7 @@ pub struct Clock {
     pub kind: String,
     /// Frame rate of a synthetic clock, hertz.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-unit" = "Hz"))]
     pub rate_hz: Option<f64>,
 }
 

@@ -35,6 +35,7 @@ pub struct SourceFile {
     /// File name, relative to the dataset.
     pub name: String,
     /// Size in bytes.
+    #[schemars(extend("x-unit" = "B"))]
     pub bytes: u64,
     /// SHA-256 of the bytes, as 64 lower-case hexadecimal digits.
     pub sha256: String,

@@ -43,6 +43,19 @@ pub const MAP_TO_FRAME: &str = "map-to-frame";
 pub const POINT_BA: &str = "point-ba";
 /// Estimate: bundle adjustment of points and lines.
 pub const POINT_LINE_BA: &str = "point-line-ba";
+/// Estimate: the lines of a sequence before they were made parallel.
+pub const UNREFINED: &str = "unrefined";
+
+/// Dataset: the first text release of the paper's data.
+pub const OPEN_STRUCTURE_TEXT: &str = "open-structure-text";
+/// Dataset: TUM RGB-D.
+pub const TUM_RGBD: &str = "tum-rgbd";
+/// Dataset: ICL-NUIM.
+pub const ICL_NUIM: &str = "icl-nuim";
+/// Dataset: TartanAir.
+pub const TARTANAIR: &str = "tartanair";
+/// Dataset: none; a simulator made the scene and the path.
+pub const SIMULATION: &str = "simulation";
 
 /// Factor: a point seen in a frame.
 pub const POINT_REPROJECTION: &str = "point-reprojection";
@@ -56,8 +69,10 @@ pub const PARALLELISM: &str = "parallelism";
 /// A family of well-known values.
 #[derive(Clone, Copy, Debug)]
 pub struct Family {
-    /// Where the values stand, such as `camera.model`.
+    /// Name of the family.
     pub name: &'static str,
+    /// Where the values stand, such as `cameras[].model` in the manifest.
+    pub place: &'static str,
     /// Whether other values are permitted.
     pub open: bool,
     /// Values with their meaning.
@@ -67,7 +82,20 @@ pub struct Family {
 /// Every family, in the order of the specification's registry.
 pub const FAMILIES: &[Family] = &[
     Family {
+        name: "dataset",
+        place: "manifest `source.dataset`",
+        open: true,
+        values: &[
+            (OPEN_STRUCTURE_TEXT, "the first release of the paper's data, as text files"),
+            (TUM_RGBD, "TUM RGB-D: a Kinect and a motion-capture system"),
+            (ICL_NUIM, "ICL-NUIM: rendered rooms; y points up in the image"),
+            (TARTANAIR, "TartanAir: rendered outdoor and indoor scenes; poses are north-east-down"),
+            (SIMULATION, "no dataset: a simulator made the scene and the path"),
+        ],
+    },
+    Family {
         name: "camera model",
+        place: "manifest `cameras[].model`",
         open: false,
         values: &[(
             PINHOLE,
@@ -76,6 +104,7 @@ pub const FAMILIES: &[Family] = &[
     },
     Family {
         name: "camera axes",
+        place: "manifest `cameras[].axes`",
         open: false,
         values: &[
             (RIGHT_DOWN_FORWARD, "x right, y down, z forward; `fy` is positive"),
@@ -84,6 +113,7 @@ pub const FAMILIES: &[Family] = &[
     },
     Family {
         name: "pixel origin",
+        place: "manifest `cameras[].pixel_origin`",
         open: false,
         values: &[
             (PIXEL_CENTER, "(0, 0) is the middle of the top-left pixel"),
@@ -92,11 +122,13 @@ pub const FAMILIES: &[Family] = &[
     },
     Family {
         name: "removed distortion",
+        place: "manifest `cameras[].removed_distortion.model`",
         open: true,
         values: &[("brown-conrady", "coefficients k1, k2, p1, p2, k3 of the model that OpenCV uses")],
     },
     Family {
         name: "clock",
+        place: "manifest `clock.kind`",
         open: false,
         values: &[
             (RECORDED, "the sensor's stamps, nanoseconds since the Unix epoch"),
@@ -105,11 +137,13 @@ pub const FAMILIES: &[Family] = &[
     },
     Family {
         name: "group kind",
+        place: "`structural_groups.kind`",
         open: true,
         values: &[(PARALLEL, "all lines of the group have the same direction, up to sign")],
     },
     Family {
         name: "noise model",
+        place: "manifest `noise.model`",
         open: true,
         values: &[
             (NOISE_NONE, "measurements equal observations; no parameter"),
@@ -119,7 +153,7 @@ pub const FAMILIES: &[Family] = &[
             ),
             (
                 NOISE_FIRST_RELEASE,
-                "as `gaussian`, but for the ends of lines a depth noise above 0.1 m is replaced by 0.08 m; parameters `sigma_px`, `sigma_depth_m`",
+                "as `gaussian`, but for the ends of lines a depth noise `α_d` above 0.1 m is replaced by 0.08 m (one below −0.1 m is kept); parameters `sigma_px`, `sigma_depth_m`",
             ),
             (
                 NOISE_PAPER,
@@ -133,16 +167,19 @@ pub const FAMILIES: &[Family] = &[
     },
     Family {
         name: "estimate",
+        place: "`estimate` of `trajectories`, `map_points` and `map_lines`",
         open: true,
         values: &[
             (FRAME_TO_FRAME, "tracking from frame to frame"),
             (MAP_TO_FRAME, "tracking against a local map"),
             (POINT_BA, "bundle adjustment of points"),
             (POINT_LINE_BA, "bundle adjustment of points and lines"),
+            (UNREFINED, "lines as observed, before they were made parallel; recovered"),
         ],
     },
     Family {
         name: "factor kind",
+        place: "`graph_factors.kind`",
         open: true,
         values: &[
             (
@@ -155,11 +192,11 @@ pub const FAMILIES: &[Family] = &[
             ),
             (
                 RELATIVE_POSE,
-                "vertices `frame_id`, `other_frame_id`; measurement `tx, ty, tz, qx, qy, qz, qw` of `frame_from_other`; information over the tangent `[rotation; translation]`",
+                "vertices `frame_id`, `other_frame_id`; measurement `tx, ty, tz, qx, qy, qz, qw` of `frame_from_other`; information over the tangent `[rotation; translation]`, applied on the left",
             ),
             (
                 PARALLELISM,
-                "vertices `line_id`; `group_id`; measurement empty; residual: direction of the line × direction of the group",
+                "vertex `line_id`, group `group_id`; measurement empty; residual: direction of the line × direction of the group; information one number (1/rad²), the same for every component",
             ),
         ],
     },
@@ -176,5 +213,89 @@ impl Family {
     #[must_use]
     pub fn knows(&self, value: &str) -> bool {
         self.values.iter().any(|(known, _)| *known == value)
+    }
+}
+
+/// Numbers of a factor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FactorSize {
+    /// Numbers of `measurement`.
+    pub measurement: usize,
+    /// Side of the information matrix.
+    pub dimension: usize,
+}
+
+impl FactorSize {
+    /// Numbers of `information`: the upper triangle of its matrix.
+    #[must_use]
+    pub const fn information(self) -> usize {
+        self.dimension * (self.dimension + 1) / 2
+    }
+}
+
+/// What a factor of a well-known kind names and holds.
+#[derive(Clone, Copy, Debug)]
+pub struct FactorShape {
+    /// Kind of the factor.
+    pub kind: &'static str,
+    /// Columns of vertices and groups that are present; the others are absent.
+    pub columns: &'static [&'static str],
+    /// Permitted sizes.
+    pub sizes: &'static [FactorSize],
+}
+
+const fn size(measurement: usize, dimension: usize) -> FactorSize {
+    FactorSize { measurement, dimension }
+}
+
+/// Shapes of the factors of every well-known kind.
+pub const FACTOR_SHAPES: &[FactorShape] = &[
+    FactorShape {
+        kind: POINT_REPROJECTION,
+        columns: &["frame_id", "point_id"],
+        sizes: &[size(2, 2), size(3, 3)],
+    },
+    FactorShape {
+        kind: LINE_REPROJECTION,
+        columns: &["frame_id", "line_id"],
+        sizes: &[size(4, 4), size(6, 6)],
+    },
+    FactorShape { kind: RELATIVE_POSE, columns: &["frame_id", "other_frame_id"], sizes: &[size(7, 6)] },
+    FactorShape { kind: PARALLELISM, columns: &["line_id", "group_id"], sizes: &[size(0, 1)] },
+];
+
+/// The shape of a factor of a well-known kind.
+#[must_use]
+pub fn factor_shape(kind: &str) -> Option<&'static FactorShape> {
+    FACTOR_SHAPES.iter().find(|shape| shape.kind == kind)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::structure::{GraphFactor, Record as _};
+
+    #[test]
+    fn every_factor_kind_has_a_shape_of_known_columns() {
+        let kinds = family("factor kind").unwrap().values;
+        assert_eq!(kinds.len(), FACTOR_SHAPES.len());
+        for (kind, _) in kinds {
+            let shape = factor_shape(kind).unwrap();
+            for column in shape.columns {
+                assert!(
+                    GraphFactor::TABLE.fields.iter().any(|field| field.name == *column && field.nullable)
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn no_family_and_no_value_is_listed_twice() {
+        for (index, family) in FAMILIES.iter().enumerate() {
+            assert!(FAMILIES[..index].iter().all(|other| other.name != family.name), "{}", family.name);
+            for (place, (value, _)) in family.values.iter().enumerate() {
+                assert!(family.values[..place].iter().all(|(other, _)| other != value), "{value}");
+            }
+        }
     }
 }

@@ -1,0 +1,51 @@
+# make demo   build, convert the committed sample to both encodings, validate it, look at it
+# make test   every test
+# make lint   formatting, clippy, documentation, dependencies
+
+SHELL := /bin/bash
+.SHELLFLAGS := -euo pipefail -c
+.DEFAULT_GOAL := help
+
+# Where `make conformance-corpus` writes.
+CORPUS ?= out/conformance
+# Seconds for each fuzz target.
+FUZZ_SECONDS ?= 30
+
+.PHONY: help setup demo test lint bench fuzz conformance-corpus spec
+
+help:
+	@sed -n 's/^# \(make .*\)/\1/p' Makefile
+	@echo 'make bench | fuzz | conformance-corpus | spec | setup'
+
+setup: ## what the other targets need
+	@.ci/setup
+
+demo: setup
+	@.ci/demo
+
+test: setup
+	@.ci/test
+
+lint:
+	cargo fmt --all --check
+	cargo clippy --workspace --all-targets --locked -- --deny warnings
+	RUSTDOCFLAGS='--deny warnings' cargo doc --workspace --no-deps --locked
+	@if command -v cargo-deny > /dev/null; then cargo deny check; else .ci/dependencies.py; fi
+
+bench:
+	cargo bench --workspace --locked
+
+# cargo-fuzz asks for a nightly compiler's flags; the stable one takes them when told to.
+fuzz:
+	@command -v cargo-fuzz > /dev/null || cargo install cargo-fuzz --locked
+	@export RUSTC_BOOTSTRAP=1; for target in $$(cargo fuzz list); do \
+	  echo "== fuzz $$target, $(FUZZ_SECONDS) s"; \
+	  cargo fuzz run "$$target" -- -max_total_time=$(FUZZ_SECONDS); \
+	done
+
+conformance-corpus:
+	cargo run --quiet --locked --example conformance_corpus -- $(CORPUS)
+
+# What is generated in spec/ and the sample, written anew.
+spec:
+	UPDATE_SPEC=1 UPDATE_SAMPLE=1 cargo test --workspace --locked --test spec_sync --test sample_sequence

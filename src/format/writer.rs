@@ -26,7 +26,8 @@ pub struct WriteOptions {
     pub force: bool,
     /// Encoding; by default the output's name decides, see [`Encoding::of_output`].
     pub encoding: Option<Encoding>,
-    /// Add channels with Foxglove's schemas, for viewers; MCAP only.
+    /// Add channels with Foxglove's schemas, for viewers; MCAP only. The map and the trajectories are then
+    /// held in memory until the first frame comes.
     pub foxglove: bool,
 }
 

@@ -3,7 +3,10 @@
 //! The checks are Python scripts in `tests/python`; they run with `.venv/bin/python`, or with the
 //! interpreter that `OPEN_STRUCTURE_PYTHON` names. Without one they are skipped, except in CI.
 
+#![expect(clippy::unwrap_used, clippy::print_stderr, reason = "tests")]
+
 mod sample;
+mod viewers;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -32,7 +35,7 @@ fn python() -> Option<PathBuf> {
     if path.exists() {
         return Some(path);
     }
-    let what = format!("no Python at {}; `make python` sets it up", path.display());
+    let what = format!("no Python at {}; `make setup` makes it", path.display());
     assert!(std::env::var("CI").as_deref() != Ok("true"), "{what}");
     eprintln!("SKIPPED: {what}");
     None

@@ -87,13 +87,13 @@ fn manifest(cameras: [PinholeCamera; 2]) -> Manifest {
         .map(|((id, camera), origin)| Camera::pinhole(CameraId(id), &camera, origin));
     let mut manifest =
         Manifest { name: "sample".to_owned(), cameras: cameras.collect(), ..Manifest::default() };
-    manifest.source.dataset = "simulation".to_owned();
+    manifest.source.dataset = "simulation".into();
     manifest.source.url = Some("https://example.org/sample".to_owned());
     manifest.source.licence = Some("CC-BY-4.0".to_owned());
     manifest.source.citation = Some("A sample, \"quoted\", 2026".to_owned());
     manifest.generator =
         Generator { tool: "test".to_owned(), version: "1".to_owned(), ..Generator::default() };
-    manifest.clock.kind = registry::RECORDED.to_owned();
+    manifest.clock.kind = registry::RECORDED.into();
     manifest.noise = Some(Noise {
         model: registry::NOISE_GAUSSIAN.to_owned(),
         seed: None,

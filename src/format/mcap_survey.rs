@@ -248,15 +248,23 @@ impl McapSurvey {
         match &tally.statistics {
             None => self.index.add(|| "no statistics".to_owned()),
             Some(found) if found.message_count != messages => {
-                self.index.add(|| format!("statistics of {} messages; {messages} are there", found.message_count));
+                self.index
+                    .add(|| format!("statistics of {} messages; {messages} are there", found.message_count));
             }
             Some(found) if u64::from(found.chunk_count) != tally.chunks => {
-                self.index.add(|| format!("statistics of {} chunks; {} are there", found.chunk_count, tally.chunks));
+                self.index.add(|| {
+                    format!("statistics of {} chunks; {} are there", found.chunk_count, tally.chunks)
+                });
             }
             Some(found)
-                if found.channel_message_counts.iter().filter(|entry| *entry.1 > 0).ne(tally.messages.iter()) =>
+                if found
+                    .channel_message_counts
+                    .iter()
+                    .filter(|entry| *entry.1 > 0)
+                    .ne(tally.messages.iter()) =>
             {
-                self.index.add(|| "statistics whose messages per channel are not those that are there".to_owned());
+                self.index
+                    .add(|| "statistics whose messages per channel are not those that are there".to_owned());
             }
             Some(_) => {}
         }
@@ -269,13 +277,15 @@ impl McapSurvey {
         }
         for (id, channel) in &self.channels {
             if !tally.summary_channels.contains(id) {
-                self.index.add(|| format!("channel {} is not repeated in the summary section", channel.topic));
+                self.index
+                    .add(|| format!("channel {} is not repeated in the summary section", channel.topic));
             }
         }
         for (channel, schema) in &tally.channel_schemas {
             if tally.schemas.contains_key(schema) && !tally.summary_schemas.contains(schema) {
                 let topic = self.channels.get(channel).map_or("", |channel| channel.topic.as_str());
-                self.index.add(|| format!("the schema of channel {topic} is not repeated in the summary section"));
+                self.index
+                    .add(|| format!("the schema of channel {topic} is not repeated in the summary section"));
             }
         }
     }

@@ -377,7 +377,7 @@ pub(crate) type Damaged = Vec<(&'static TableInfo, Error)>;
 type OpenedTables = (BTreeMap<&'static str, ParquetTableReader>, Vec<String>, Damaged);
 
 /// The bytes of a folder's manifest.
-pub(crate) fn read_manifest(path: &Path) -> Result<Vec<u8>, Error> {
+fn read_manifest(path: &Path) -> Result<Vec<u8>, Error> {
     let manifest_path = path.join(names::MANIFEST_FILE);
     let found = match fs::metadata(&manifest_path) {
         Ok(found) if found.is_file() => found,
@@ -407,10 +407,8 @@ pub(crate) fn read_manifest(path: &Path) -> Result<Vec<u8>, Error> {
 }
 
 fn parse_manifest(path: &Path) -> Result<Manifest, Error> {
-    serde_json::from_slice(&read_manifest(path)?).map_err(|error| Error::Manifest {
-        path: path.join(names::MANIFEST_FILE),
-        detail: error.to_string(),
-    })
+    serde_json::from_slice(&read_manifest(path)?)
+        .map_err(|error| Error::Manifest { path: path.join(names::MANIFEST_FILE), detail: error.to_string() })
 }
 
 fn open_tables(path: &Path, bytes_read: &Arc<AtomicU64>) -> Result<OpenedTables, Error> {

@@ -16,14 +16,16 @@ use super::arrow_batch::from_batch;
 use super::arrow_message::{decode_batch, decode_schema};
 use super::counted_file::CountedFile;
 use super::guard::guarded;
+use super::mcap_survey::McapSurvey;
+use super::reader::Damaged;
 use super::stored_table::StoredTable;
 use super::{Error, names};
 use crate::structure::{Manifest, Record, TableSummary, table_info};
 
 /// Largest chunk that is decompressed; writers keep to a few MiB.
-const MAX_CHUNK_BYTES: u64 = 1 << 29;
+pub(super) const MAX_CHUNK_BYTES: u64 = 1 << 29;
 /// Largest plausible ratio of a chunk's sizes; zstd reaches a few thousand on constant data.
-const MAX_CHUNK_RATIO: u64 = 1 << 16;
+pub(super) const MAX_CHUNK_RATIO: u64 = 1 << 16;
 
 /// A table's channel.
 #[derive(Clone, Debug)]
@@ -42,10 +44,10 @@ pub(super) struct McapReader {
 }
 
 impl McapReader {
-    pub(super) fn open(path: &Path, bytes_read: Arc<AtomicU64>) -> Result<Self, Error> {
+    /// Opens a file; tables whose channels cannot be understood are listed apart.
+    pub(super) fn open(path: &Path, bytes_read: Arc<AtomicU64>) -> Result<(Self, Damaged), Error> {
         let file = CountedFile::open(path, bytes_read)?;
         let summary = guarded(path, "MCAP", || read_summary(&file))?;
-        let failed = |detail: String| Error::Container { path: path.to_owned(), container: "MCAP", detail };
         for chunk in &summary.chunk_indexes {
             let limit = chunk.compressed_size.saturating_mul(MAX_CHUNK_RATIO).min(MAX_CHUNK_BYTES);
             if chunk.uncompressed_size > limit {
@@ -59,7 +61,7 @@ impl McapReader {
             }
         }
         let mut channels: BTreeMap<&'static str, Vec<TableChannel>> = BTreeMap::new();
-        let (mut stored, mut passed_over) = (Vec::new(), Vec::new());
+        let (mut stored, mut passed_over, mut damaged) = (Vec::new(), Vec::new(), Vec::new());
         let mut listed: Vec<_> = summary.channels.values().collect();
         listed.sort_by(|left, right| left.topic.cmp(&right.topic).then(left.id.cmp(&right.id)));
         for channel in listed {
@@ -73,25 +75,15 @@ impl McapReader {
                 passed_over.push(topic.to_owned());
                 continue;
             };
-            if channel.message_encoding != names::ARROW_ENCODING {
-                return Err(failed(format!(
-                    "topic {topic} has message encoding `{}`; expected `{}`",
-                    channel.message_encoding,
-                    names::ARROW_ENCODING
-                )));
+            match table_schema(path, channel) {
+                Ok(schema) => {
+                    stored.push(StoredTable::new(table, &schema, None));
+                    channels.entry(table.name).or_default().push(TableChannel { id: channel.id, schema });
+                }
+                Err(error) => damaged.push((table, error)),
             }
-            let Some(schema) = channel.schema.as_ref() else {
-                return Err(failed(format!("topic {topic} has no schema")));
-            };
-            let schema = guarded(path, "Arrow", || {
-                decode_schema(&schema.data)
-                    .map_err(|error| failed(format!("schema of topic {topic}: {error}")))
-            })?;
-            let schema = Arc::new(schema);
-            stored.push(StoredTable::new(table, &schema, None));
-            channels.entry(table.name).or_default().push(TableChannel { id: channel.id, schema });
         }
-        Ok(Self { file, summary, channels, stored, passed_over })
+        Ok((Self { file, summary, channels, stored, passed_over }, damaged))
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -108,34 +100,20 @@ impl McapReader {
         &self.passed_over
     }
 
-    /// The MCAP profile, identity and index, as the validator wants to see them.
-    pub(super) fn summary(&self) -> &Summary {
-        &self.summary
+    /// Topics that are neither of this format nor of the viewer channels that a writer may add.
+    pub(super) fn unknown_topics(&self) -> Vec<String> {
+        let for_viewers = |topic: &str| {
+            self.summary.channels.values().any(|channel| {
+                channel.topic == topic
+                    && channel.schema.as_ref().is_some_and(|schema| schema.name.starts_with("foxglove."))
+            })
+        };
+        self.passed_over.iter().filter(|topic| !for_viewers(topic)).cloned().collect()
     }
 
-    /// The Metadata records, by name, with their index.
-    pub(super) fn metadata(&self) -> Result<Vec<mcap::records::Metadata>, Error> {
-        let failed =
-            |detail: String| Error::Container { path: self.path().to_owned(), container: "MCAP", detail };
-        self.summary
-            .metadata_indexes
-            .iter()
-            .map(|index| {
-                guarded(self.path(), "MCAP", || {
-                    let length = usize::try_from(index.length).map_err(|error| failed(error.to_string()))?;
-                    let bytes =
-                        self.file.read_exact_at(index.offset, length).map_err(Error::io(self.path()))?;
-                    // The record's opcode and length stand before its body.
-                    let body =
-                        bytes.get(9..).ok_or_else(|| failed("metadata record is too short".to_owned()))?;
-                    match mcap::parse_record(mcap::records::op::METADATA, body) {
-                        Ok(mcap::records::Record::Metadata(metadata)) => Ok(metadata),
-                        Ok(_) => Err(failed("metadata index points at another record".to_owned())),
-                        Err(error) => Err(failed(error.to_string())),
-                    }
-                })
-            })
-            .collect()
+    /// Reads the whole file once, without its index.
+    pub(super) fn survey(&self) -> McapSurvey {
+        McapSurvey::read(&self.file)
     }
 
     fn channel_named(&self, topic: &str) -> Option<u16> {
@@ -167,6 +145,13 @@ impl McapReader {
                 found: format!("an MCAP file without a message on {}", names::MANIFEST_TOPIC),
             }),
         }
+    }
+
+    /// The texts of the table summaries, as they are.
+    pub(super) fn summary_texts(&self) -> Result<Vec<Vec<u8>>, Error> {
+        self.messages([names::SUMMARY_TOPIC.to_owned()], None)?
+            .map(|message| message.map(|message| message.data))
+            .collect()
     }
 
     /// The manifest, with the table summaries put in.
@@ -257,6 +242,26 @@ impl McapReader {
             Ok(())
         })
     }
+}
+
+/// The Arrow schema of a table's channel.
+fn table_schema(path: &Path, channel: &mcap::Channel<'_>) -> Result<SchemaRef, Error> {
+    let topic = &channel.topic;
+    let failed = |detail: String| Error::Container { path: path.to_owned(), container: "MCAP", detail };
+    if channel.message_encoding != names::ARROW_ENCODING {
+        return Err(failed(format!(
+            "topic {topic} has message encoding `{}`; expected `{}`",
+            channel.message_encoding,
+            names::ARROW_ENCODING
+        )));
+    }
+    let Some(schema) = channel.schema.as_ref() else {
+        return Err(failed(format!("topic {topic} has no schema")));
+    };
+    guarded(path, "Arrow", || {
+        decode_schema(&schema.data).map_err(|error| failed(format!("schema of topic {topic}: {error}")))
+    })
+    .map(Arc::new)
 }
 
 /// A message and where it belongs.

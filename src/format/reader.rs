@@ -9,12 +9,13 @@ use std::sync::{Arc, OnceLock};
 
 use super::encoding::Encoding;
 use super::mcap_reader::{McapReader, Message, Messages};
+use super::mcap_survey::McapSurvey;
 use super::parquet_reader::{ParquetBatches, ParquetTableReader};
 use super::stored_table::StoredTable;
 use super::{Error, names};
 use crate::structure::{
     Frame, FrameBundle, FrameId, LineMeasurement, LineObservation, Manifest, PointMeasurement,
-    PointObservation, Record, Sequence, TABLES, for_each_frame_table, for_each_table, table_info,
+    PointObservation, Record, Sequence, TABLES, TableInfo, for_each_frame_table, for_each_table, table_info,
 };
 
 /// Most rows that are held in memory at once; longer tables are read in batches.
@@ -70,13 +71,21 @@ impl SequenceReader {
         let bytes_read = Arc::new(AtomicU64::new(0));
         let found = fs::metadata(path).map_err(Error::io(path))?;
         let (manifest, backend, passed_over) = if found.is_dir() {
-            open_folder(path, &bytes_read)?
+            let manifest = parse_manifest(path)?;
+            let (tables, passed_over, mut damaged) = open_tables(path, &bytes_read)?;
+            if !damaged.is_empty() {
+                return Err(damaged.swap_remove(0).1);
+            }
+            (manifest, Backend::Parquet(tables), passed_over)
         } else if path.file_name().is_some_and(|name| name == names::MANIFEST_FILE) {
             return Self::open(
                 path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new(".")),
             );
         } else {
-            let reader = McapReader::open(path, Arc::clone(&bytes_read))?;
+            let (reader, mut damaged) = McapReader::open(path, Arc::clone(&bytes_read))?;
+            if !damaged.is_empty() {
+                return Err(damaged.swap_remove(0).1);
+            }
             let passed_over = reader.passed_over().to_vec();
             (reader.manifest()?, Backend::Mcap(Box::new(reader)), passed_over)
         };
@@ -92,6 +101,56 @@ impl SequenceReader {
             passed_over,
             bytes_read,
         })
+    }
+
+    /// Opens what can be opened, for the validator: tables that cannot are listed instead, and the
+    /// manifest is not looked at ([`manifest`](Self::manifest) gives the default one).
+    ///
+    /// # Errors
+    /// [`Error::Container`] and the like when the container gives access to nothing.
+    pub(crate) fn open_lenient(path: &Path) -> Result<(Self, Damaged), Error> {
+        let bytes_read = Arc::new(AtomicU64::new(0));
+        let (backend, passed_over, damaged) = if path.is_dir() {
+            let (tables, passed_over, damaged) = open_tables(path, &bytes_read)?;
+            (Backend::Parquet(tables), passed_over, damaged)
+        } else {
+            let (reader, damaged) = McapReader::open(path, Arc::clone(&bytes_read))?;
+            let passed_over = reader.unknown_topics();
+            (Backend::Mcap(Box::new(reader)), passed_over, damaged)
+        };
+        let reader = Self {
+            path: path.to_owned(),
+            manifest: Manifest::default(),
+            backend,
+            frames: OnceLock::new(),
+            passed_over,
+            bytes_read,
+        };
+        Ok((reader, damaged))
+    }
+
+    /// The bytes of the manifest as they are.
+    pub(crate) fn manifest_text(&self) -> Result<Vec<u8>, Error> {
+        match &self.backend {
+            Backend::Mcap(reader) => reader.manifest_text(),
+            Backend::Parquet(_) => read_manifest(&self.path),
+        }
+    }
+
+    /// The bytes of the table summaries, which an MCAP file has as messages of their own.
+    pub(crate) fn summary_texts(&self) -> Result<Vec<Vec<u8>>, Error> {
+        match &self.backend {
+            Backend::Mcap(reader) => reader.summary_texts(),
+            Backend::Parquet(_) => Ok(Vec::new()),
+        }
+    }
+
+    /// What the container of an MCAP file says of itself, read from its first byte to its last.
+    pub(crate) fn survey(&self) -> Option<McapSurvey> {
+        match &self.backend {
+            Backend::Mcap(reader) => Some(reader.survey()),
+            Backend::Parquet(_) => None,
+        }
     }
 
     /// Where the sequence lies.
@@ -182,7 +241,7 @@ impl SequenceReader {
                 None => BatchSource::Empty,
             },
         };
-        Ok(Batches { source, row: 0, row_type: std::marker::PhantomData })
+        Ok(Batches { source, row: 0, log_time: None, row_type: std::marker::PhantomData })
     }
 
     /// Every table.
@@ -312,12 +371,22 @@ impl SequenceReader {
     }
 }
 
-type Opened = (Manifest, Backend, Vec<String>);
+/// Known tables that are there but cannot be opened.
+pub(crate) type Damaged = Vec<(&'static TableInfo, Error)>;
 
-fn open_folder(path: &Path, bytes_read: &Arc<AtomicU64>) -> Result<Opened, Error> {
+type OpenedTables = (BTreeMap<&'static str, ParquetTableReader>, Vec<String>, Damaged);
+
+/// The bytes of a folder's manifest.
+fn read_manifest(path: &Path) -> Result<Vec<u8>, Error> {
     let manifest_path = path.join(names::MANIFEST_FILE);
-    let length = match fs::metadata(&manifest_path) {
-        Ok(found) => found.len(),
+    let found = match fs::metadata(&manifest_path) {
+        Ok(found) if found.is_file() => found,
+        Ok(_) => {
+            return Err(Error::NotASequence {
+                path: path.to_owned(),
+                found: format!("a folder whose {} is not a file", names::MANIFEST_FILE),
+            });
+        }
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
             return Err(Error::NotASequence {
                 path: path.to_owned(),
@@ -326,33 +395,47 @@ fn open_folder(path: &Path, bytes_read: &Arc<AtomicU64>) -> Result<Opened, Error
         }
         Err(error) => return Err(Error::io(&manifest_path)(error)),
     };
-    if length > MAX_MANIFEST_BYTES {
+    if found.len() > MAX_MANIFEST_BYTES {
         return Err(Error::TooLarge {
             path: manifest_path,
             what: "manifest size".to_owned(),
-            found: length,
+            found: found.len(),
             limit: MAX_MANIFEST_BYTES,
         });
     }
-    let text = fs::read(&manifest_path).map_err(Error::io(&manifest_path))?;
-    let manifest: Manifest = serde_json::from_slice(&text)
-        .map_err(|error| Error::Manifest { path: manifest_path.clone(), detail: error.to_string() })?;
-    let (mut tables, mut passed_over) = (BTreeMap::new(), Vec::new());
+    fs::read(&manifest_path).map_err(Error::io(&manifest_path))
+}
+
+fn parse_manifest(path: &Path) -> Result<Manifest, Error> {
+    serde_json::from_slice(&read_manifest(path)?)
+        .map_err(|error| Error::Manifest { path: path.join(names::MANIFEST_FILE), detail: error.to_string() })
+}
+
+fn open_tables(path: &Path, bytes_read: &Arc<AtomicU64>) -> Result<OpenedTables, Error> {
+    let (mut tables, mut passed_over, mut damaged) = (BTreeMap::new(), Vec::new(), Vec::new());
     for entry in fs::read_dir(path).map_err(Error::io(path))? {
         let entry = entry.map_err(Error::io(path))?;
         let file_name = entry.file_name();
         let name = file_name.to_string_lossy();
         match name.strip_suffix(".parquet").and_then(table_info) {
-            Some(table) => {
-                let reader = ParquetTableReader::open(&entry.path(), table, Arc::clone(bytes_read))?;
-                tables.insert(table.name, reader);
+            Some(table) if !entry.path().is_file() => {
+                let detail = "not a regular file".to_owned();
+                let error = Error::Container { path: entry.path(), container: "Parquet", detail };
+                damaged.push((table, error));
             }
+            Some(table) => match ParquetTableReader::open(&entry.path(), table, Arc::clone(bytes_read)) {
+                Ok(reader) => {
+                    tables.insert(table.name, reader);
+                }
+                Err(error) => damaged.push((table, error)),
+            },
             None if name == names::MANIFEST_FILE || name == names::CROISSANT_FILE => {}
             None => passed_over.push(name.into_owned()),
         }
     }
     passed_over.sort();
-    Ok((manifest, Backend::Parquet(tables), passed_over))
+    damaged.sort_by_key(|(table, _)| table.name);
+    Ok((tables, passed_over, damaged))
 }
 
 /// Topics of the per-frame tables.
@@ -375,7 +458,15 @@ enum BatchSource<'a> {
 pub struct Batches<'a, R> {
     source: BatchSource<'a>,
     row: u64,
+    log_time: Option<u64>,
     row_type: std::marker::PhantomData<fn() -> R>,
+}
+
+impl<R> Batches<'_, R> {
+    /// Stamp of the message that held the last batch, nanoseconds; `None` for a Parquet file.
+    pub(crate) const fn log_time(&self) -> Option<u64> {
+        self.log_time
+    }
 }
 
 impl<R: Record> Iterator for Batches<'_, R> {
@@ -390,7 +481,10 @@ impl<R: Record> Iterator for Batches<'_, R> {
                     Err(error) => break Some(Err(error)),
                     Ok(message) => match reader.rows::<R>(&message, self.row) {
                         Ok(None) => {}
-                        Ok(Some(rows)) => break Some(Ok(rows)),
+                        Ok(Some(rows)) => {
+                            self.log_time = Some(message.log_time);
+                            break Some(Ok(rows));
+                        }
                         Err(error) => break Some(Err(error)),
                     },
                 }

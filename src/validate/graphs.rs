@@ -1,0 +1,252 @@
+//! Factor graphs: vertices, the shape of factors, information matrices.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::estimates::remember;
+use super::finding::{Detail, Findings};
+use super::frames::{FrameIndex, quaternion};
+use super::ids::Unknown;
+use super::rules::RuleId;
+use super::tables::{Outcome, Shared, check};
+use crate::structure::{GraphFactor, GraphLine, GraphPoint, GraphPose, registry};
+
+const FACTORS: Option<&str> = Some("graph_factors");
+/// Rounding that the smallest pivot of an information matrix may show, relative to the largest entry.
+const PIVOT_TOLERANCE: f64 = 1e-9;
+
+/// Vertices of one kind, by graph.
+#[derive(Default)]
+struct Vertices(BTreeMap<String, Vec<i64>>);
+
+impl Vertices {
+    fn add(&mut self, graph: &str, id: i64) {
+        match self.0.get_mut(graph) {
+            Some(ids) => ids.push(id),
+            None => drop(self.0.insert(graph.to_owned(), vec![id])),
+        }
+    }
+
+    fn sort(&mut self) {
+        self.0.values_mut().for_each(|ids| ids.sort_unstable());
+    }
+
+    fn contains(&self, graph: &str, id: i64) -> bool {
+        self.0.get(graph).is_some_and(|ids| ids.binary_search(&id).is_ok())
+    }
+}
+
+/// Checks the four tables of graphs; gives their outcomes by table.
+pub(crate) fn graphs(
+    shared: &Shared<'_>,
+    frames: &FrameIndex,
+    kinds: &mut BTreeSet<String>,
+    findings: &mut Findings,
+) -> Vec<(&'static str, Outcome)> {
+    let (mut poses, mut points, mut lines) = (Vertices::default(), Vertices::default(), Vertices::default());
+    let mut unknown = Unknown::default();
+    let pose_outcome = check::<GraphPose>(shared, findings, |batch, first_row, _, findings| {
+        for (row, pose) in (first_row..).zip(batch) {
+            quaternion(&pose.world_from_camera(), row, "graph_poses", findings);
+            if !frames.contains(pose.frame_id.0) {
+                unknown.add(pose.frame_id.0, row);
+            }
+            poses.add(&pose.graph, pose.frame_id.0);
+        }
+    });
+    unknown.report(RuleId::FrameKnown, "graph_poses", "frame", "frames", findings);
+    let point_outcome = check::<GraphPoint>(shared, findings, |batch, _, _, _| {
+        batch.iter().for_each(|point| points.add(&point.graph, point.point_id.0));
+    });
+    let line_outcome = check::<GraphLine>(shared, findings, |batch, _, _, _| {
+        batch.iter().for_each(|line| lines.add(&line.graph, line.line_id.0));
+    });
+    [&mut poses, &mut points, &mut lines].into_iter().for_each(Vertices::sort);
+    let factor_outcome = check::<GraphFactor>(shared, findings, |batch, first_row, _, findings| {
+        remember(kinds, batch.iter().map(|factor| &factor.kind));
+        for (row, factor) in (first_row..).zip(batch) {
+            let pose = |id: i64| poses.contains(&factor.graph, id);
+            let vertices = [
+                ("frame", factor.frame_id.map(|id| id.0).filter(|id| !pose(*id)), "graph_poses"),
+                ("frame", factor.other_frame_id.map(|id| id.0).filter(|id| !pose(*id)), "graph_poses"),
+                (
+                    "point",
+                    factor.point_id.map(|id| id.0).filter(|id| !points.contains(&factor.graph, *id)),
+                    "graph_points",
+                ),
+                (
+                    "line",
+                    factor.line_id.map(|id| id.0).filter(|id| !lines.contains(&factor.graph, *id)),
+                    "graph_lines",
+                ),
+            ];
+            for (word, missing, table) in vertices {
+                if let Some(id) = missing {
+                    findings.add(RuleId::GraphVerticesKnown, FACTORS, || {
+                        let expected = format!("{word} {id} in {table} of graph `{}`", factor.graph);
+                        Detail::new(expected, "not there").row(row).id(format!("factor {}", factor.factor_id))
+                    });
+                }
+            }
+            shape(factor, row, findings);
+            information(factor, row, findings);
+        }
+    });
+    vec![
+        ("graph_poses", pose_outcome),
+        ("graph_points", point_outcome),
+        ("graph_lines", line_outcome),
+        ("graph_factors", factor_outcome),
+    ]
+}
+
+/// What the registry says of a kind of factor.
+struct Shape {
+    /// Whether `frame_id`, `other_frame_id`, `point_id`, `line_id`, `group_id` are named.
+    vertices: [bool; 5],
+    measurement: &'static [usize],
+    /// Dimension of the information matrix for a measurement of so many numbers.
+    dimension: fn(usize) -> usize,
+}
+
+fn registered(kind: &str) -> Option<Shape> {
+    const YES: bool = true;
+    const NO: bool = false;
+    Some(match kind {
+        registry::POINT_REPROJECTION => {
+            Shape { vertices: [YES, NO, YES, NO, NO], measurement: &[2, 3], dimension: |count| count }
+        }
+        registry::LINE_REPROJECTION => {
+            Shape { vertices: [YES, NO, NO, YES, NO], measurement: &[4, 6], dimension: |count| count }
+        }
+        registry::RELATIVE_POSE => {
+            Shape { vertices: [YES, YES, NO, NO, NO], measurement: &[7], dimension: |_| 6 }
+        }
+        registry::PARALLELISM => {
+            Shape { vertices: [NO, NO, NO, YES, YES], measurement: &[0], dimension: |_| 3 }
+        }
+        _ => return None,
+    })
+}
+
+fn shape(factor: &GraphFactor, row: u64, findings: &mut Findings) {
+    let Some(shape) = registered(&factor.kind) else { return };
+    let named = [
+        ("frame_id", factor.frame_id.is_some()),
+        ("other_frame_id", factor.other_frame_id.is_some()),
+        ("point_id", factor.point_id.is_some()),
+        ("line_id", factor.line_id.is_some()),
+        ("group_id", factor.group_id.is_some()),
+    ];
+    let mut broken = |expected: String, found: String| {
+        findings.add(RuleId::GraphFactorShape, FACTORS, || {
+            let id = format!("factor {} of graph `{}`", factor.factor_id, factor.graph);
+            Detail::new(expected, found).row(row).id(id)
+        });
+    };
+    for ((column, there), wanted) in named.into_iter().zip(shape.vertices) {
+        if there != wanted {
+            let word = |there: bool| if there { "a value" } else { "null" };
+            broken(
+                format!("{} in {column} of a {} factor", word(wanted), factor.kind),
+                word(there).to_owned(),
+            );
+        }
+    }
+    let count = factor.measurement.len();
+    if !shape.measurement.contains(&count) {
+        let counts: Vec<String> = shape.measurement.iter().map(ToString::to_string).collect();
+        let expected = format!("a measurement of {} numbers for {}", counts.join(" or "), factor.kind);
+        broken(expected, format!("{count} numbers"));
+    } else if let Some(information) = &factor.information {
+        let dimension = (shape.dimension)(count);
+        let wanted = dimension * (dimension + 1) / 2;
+        if information.len() != wanted {
+            let expected =
+                format!("the {wanted} numbers of the upper triangle of a {dimension}x{dimension} matrix");
+            broken(expected, format!("{} numbers", information.len()));
+        }
+    }
+}
+
+/// The dimension of a matrix whose upper triangle has so many numbers.
+fn dimension_of(count: usize) -> Option<usize> {
+    (1..=64).find(|dimension| dimension * (dimension + 1) / 2 == count)
+}
+
+fn information(factor: &GraphFactor, row: u64, findings: &mut Findings) {
+    let Some(numbers) = factor.information.as_deref().filter(|numbers| !numbers.is_empty()) else { return };
+    // What is not finite is a finding of its own.
+    let Some(dimension) = dimension_of(numbers.len()) else { return };
+    if numbers.iter().all(|number| number.is_finite()) && !is_positive(numbers, dimension) {
+        findings.add(RuleId::GraphInformationPositive, FACTORS, || {
+            let id = format!("factor {} of graph `{}`", factor.factor_id, factor.graph);
+            let found = format!("a {dimension}x{dimension} matrix with a negative eigenvalue");
+            Detail::new("a positive semi-definite information matrix", found).row(row).id(id)
+        });
+    }
+}
+
+/// Whether a symmetric matrix, given by the rows of its upper triangle, has no negative eigenvalue.
+///
+/// Eliminates with the largest diagonal entry first: of a semi-definite matrix no pivot is negative, and where
+/// the largest one is zero nothing is left.
+fn is_positive(upper: &[f64], dimension: usize) -> bool {
+    let mut matrix = vec![0.0; dimension * dimension];
+    let mut numbers = upper.iter();
+    for row in 0..dimension {
+        for column in row..dimension {
+            let number = numbers.next().copied().unwrap_or(0.0);
+            matrix[row * dimension + column] = number;
+            matrix[column * dimension + row] = number;
+        }
+    }
+    let largest = upper.iter().fold(0.0_f64, |largest, number| largest.max(number.abs()));
+    if largest == 0.0 {
+        return true;
+    }
+    matrix.iter_mut().for_each(|entry| *entry /= largest);
+    let mut left: Vec<usize> = (0..dimension).collect();
+    while let Some(place) = (0..left.len())
+        .max_by(|a, b| matrix[left[*a] * (dimension + 1)].total_cmp(&matrix[left[*b] * (dimension + 1)]))
+    {
+        let pivot = left.swap_remove(place);
+        let diagonal = matrix[pivot * (dimension + 1)];
+        if diagonal <= PIVOT_TOLERANCE {
+            // Nothing larger is left on the diagonal, so nothing may be left at all.
+            return diagonal >= -PIVOT_TOLERANCE
+                && left.iter().all(|row| {
+                    matrix[row * (dimension + 1)] >= -PIVOT_TOLERANCE
+                        && matrix[row * dimension + pivot].abs() <= PIVOT_TOLERANCE.sqrt()
+                })
+                && left.iter().all(|row| {
+                    left.iter().all(|column| matrix[row * dimension + column].abs() <= PIVOT_TOLERANCE.sqrt())
+                });
+        }
+        for row in &left {
+            let factor = matrix[row * dimension + pivot] / diagonal;
+            for column in &left {
+                matrix[row * dimension + column] -= factor * matrix[pivot * dimension + column];
+            }
+        }
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn semi_definite_matrices_are_told_from_others() {
+        assert!(is_positive(&[1.0, 0.0, 1.0], 2));
+        assert!(is_positive(&[1e-12, 0.0, 1e12], 2));
+        assert!(is_positive(&[4.0, 2.0, 1.0], 2), "rank one");
+        assert!(is_positive(&[0.0, 0.0, 0.0], 2));
+        assert!(is_positive(&[0.0, 0.0, 5.0], 2));
+        assert!(is_positive(&[2.0, -1.0, 0.0, 2.0, -1.0, 2.0], 3));
+        assert!(!is_positive(&[1.0, 2.0, 1.0], 2));
+        assert!(!is_positive(&[0.0, 1.0, 0.0], 2));
+        assert!(!is_positive(&[-1.0], 1));
+        assert!(!is_positive(&[1.0, 0.0, 0.0, 1.0, 0.0, -1e-3], 3));
+    }
+}

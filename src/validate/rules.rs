@@ -1,0 +1,341 @@
+//! The rules of the specification, in its order.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What a broken rule means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[schemars(inline)]
+pub enum Severity {
+    /// Worth knowing; the sequence conforms all the same.
+    Advice,
+    /// The specification says SHOULD; the sequence conforms.
+    Warning,
+    /// The specification says MUST; the sequence does not conform.
+    Error,
+}
+
+impl Severity {
+    /// `error`, `warning` or `advice`.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Advice => "advice",
+            Self::Warning => "warning",
+            Self::Error => "error",
+        }
+    }
+}
+
+/// One rule of the specification.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Rule {
+    /// Its stable name.
+    pub id: &'static str,
+    /// What breaking it means.
+    pub severity: Severity,
+    /// Section of the specification.
+    pub section: &'static str,
+    /// What must or should hold, in one sentence.
+    pub statement: &'static str,
+    /// The reason, where it is not plain.
+    pub why: Option<&'static str>,
+    /// First version of the specification with the rule.
+    pub since: &'static str,
+}
+
+macro_rules! rules {
+    ($($variant:ident: $id:literal, $severity:ident, $section:literal, $statement:literal, $why:expr, $since:literal;)+) => {
+        /// A rule, as the checks name it.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub(crate) enum RuleId {
+            $($variant),+
+        }
+
+        /// Every rule, in the order of the specification.
+        pub const RULES: &[Rule] = &[
+            $(Rule {
+                id: $id,
+                severity: Severity::$severity,
+                section: $section,
+                statement: $statement,
+                why: $why,
+                since: $since,
+            }),+
+        ];
+    };
+}
+
+rules! {
+    ContainerReadable: "container-readable", Error, "Container",
+        "A sequence MUST be an MCAP file or a Parquet folder that can be decoded throughout.",
+        None, "1.0.0";
+    ContainerChecksums: "container-checksums", Error, "Container",
+        "Every checksum of an MCAP file MUST be right.",
+        None, "1.0.0";
+    McapProfileEmpty: "mcap-profile-empty", Error, "Container",
+        "The profile of an MCAP file MUST be the empty string.",
+        None, "1.0.0";
+    McapIdentity: "mcap-identity", Error, "Container",
+        "An MCAP file MUST hold one Metadata record `open-structure` whose `spec_version` and `name` equal the manifest's.",
+        None, "1.0.0";
+    McapIndexed: "mcap-indexed", Error, "Container",
+        "An MCAP file MUST be chunked and have a summary section with statistics, chunk indexes, message indexes and repeated channels and schemas.",
+        Some("A reader finds one frame of a large file without reading the rest."), "1.0.0";
+    McapSchemasEmbedded: "mcap-schemas-embedded", Error, "Container",
+        "A table's channel MUST carry its Arrow schema, and a JSON channel a JSON Schema that its messages satisfy.",
+        None, "1.0.0";
+    McapMessageTimes: "mcap-message-times", Error, "Container",
+        "The manifest and the tables of the whole sequence MUST be stamped with the first frame's stamp, rows of a frame with the frame's stamp, table summaries with the last frame's stamp; log times MUST NOT fall in file order.",
+        None, "1.0.0";
+    McapOneMessagePerFrame: "mcap-one-message-per-frame", Error, "Container",
+        "A per-frame table MUST have at most one message for each frame, holding rows of that frame alone.",
+        None, "1.0.0";
+    ManifestSchema: "manifest-schema", Error, "Manifest",
+        "The manifest MUST satisfy its JSON Schema.",
+        None, "1.0.0";
+    ManifestVersion: "manifest-version", Error, "Manifest",
+        "`spec_version` MUST be `major.minor.patch` with a known major version.",
+        None, "1.0.0";
+    ManifestName: "manifest-name", Error, "Manifest",
+        "`name` MUST NOT be empty, nor contain `/`, `\\` or control characters.",
+        Some("Tools make file names of it."), "1.0.0";
+    ManifestConventions: "manifest-conventions", Error, "Manifest",
+        "`conventions` MUST hold the values of version 1.",
+        None, "1.0.0";
+    CamerasValid: "cameras-valid", Error, "Manifest",
+        "Camera ids MUST be unique and not negative, sizes positive, intrinsics finite with `fx` positive and `fy` not zero, and depth limits positive and in order.",
+        None, "1.0.0";
+    CameraAxes: "camera-axes", Error, "Manifest",
+        "`axes` MUST be `right-up-forward` exactly when `fy` is negative.",
+        None, "1.0.0";
+    RegistryClosed: "registry-closed", Error, "Manifest",
+        "Values of closed families (camera model, camera axes, pixel origin, clock) MUST be registered.",
+        Some("A reader that does not know them cannot use the numbers."), "1.0.0";
+    RegistryOpen: "registry-open", Advice, "Manifest",
+        "Values of open families (group kind, noise model, factor kind, estimate, removed distortion) SHOULD be taken from the registry where it has one that fits.",
+        None, "1.0.0";
+    UnknownContent: "unknown-content", Advice, "Manifest",
+        "Columns, tables, topics, files and manifest fields that this version does not know are passed over.",
+        None, "1.0.0";
+    SourceDocumented: "source-documented", Advice, "Manifest",
+        "The licence and the citation of the source SHOULD be given.",
+        None, "1.0.0";
+    FramesPresent: "frames-present", Error, "Tables",
+        "The table `frames` MUST be there.",
+        None, "1.0.0";
+    TablesListed: "tables-listed", Error, "Tables",
+        "The table summaries MUST list exactly the known tables that are there, each once.",
+        None, "1.0.0";
+    TableRows: "table-rows", Error, "Tables",
+        "The number of rows of a table MUST equal its summary's.",
+        None, "1.0.0";
+    TableDigest: "table-digest", Error, "Tables",
+        "The digest of a table MUST equal its summary's.",
+        Some("It is the same in both encodings, so a copy can be held against its original."), "1.0.0";
+    ColumnsPresent: "columns-present", Error, "Tables",
+        "Columns that are not nullable MUST be there.",
+        None, "1.0.0";
+    ColumnsTyped: "columns-typed", Error, "Tables",
+        "Columns MUST have the types of this specification.",
+        None, "1.0.0";
+    ColumnsNotNull: "columns-not-null", Error, "Tables",
+        "Values of columns that are not nullable, and elements of lists, MUST NOT be null.",
+        None, "1.0.0";
+    RowsOrdered: "rows-ordered", Error, "Tables",
+        "Rows MUST be sorted by the table's key, ascending.",
+        Some("One frame is found without reading the others."), "1.0.0";
+    KeysUnique: "keys-unique", Error, "Tables",
+        "A key MUST NOT occur twice in a table.",
+        None, "1.0.0";
+    IdsNotNegative: "ids-not-negative", Error, "Tables",
+        "Ids and row numbers MUST NOT be negative.",
+        None, "1.0.0";
+    ValuesFinite: "values-finite", Error, "Tables",
+        "Floats MUST be finite.",
+        Some("What is not known is null, not NaN."), "1.0.0";
+    StampsOrdered: "stamps-ordered", Error, "Frames and poses",
+        "Stamps MUST NOT be negative and MUST NOT fall from frame to frame.",
+        None, "1.0.0";
+    CameraKnown: "camera-known", Error, "Frames and poses",
+        "The camera of a frame MUST be in the manifest.",
+        None, "1.0.0";
+    PoseWhole: "pose-whole", Error, "Frames and poses",
+        "The seven pose columns of a frame MUST be present together or absent together.",
+        None, "1.0.0";
+    QuaternionUnit: "quaternion-unit", Error, "Frames and poses",
+        "Quaternions MUST have unit length within 1e-3.",
+        Some("Sources print as few as four decimals and their digits are kept; readers normalise."), "1.0.0";
+    FrameKnown: "frame-known", Error, "References",
+        "A frame id in any table MUST be in `frames`.",
+        None, "1.0.0";
+    LandmarkKnown: "landmark-known", Warning, "References",
+        "A landmark that is measured or observed SHOULD be in its landmark table, where that table is there.",
+        None, "1.0.0";
+    LandmarkSeen: "landmark-seen", Advice, "References",
+        "A landmark SHOULD be seen by at least one row.",
+        None, "1.0.0";
+    CorrespondencesAgree: "correspondences-agree", Error, "References",
+        "An entry of a correspondence MUST name a row of its table that shows the landmark in that frame, and every row of the table MUST be in it once.",
+        None, "1.0.0";
+    EstimatesDistinct: "estimates-distinct", Advice, "References",
+        "Two estimates with identical poses are probably one.",
+        None, "1.0.0";
+    PixelInImage: "pixel-in-image", Warning, "Measurements",
+        "Pixel positions SHOULD lie in the image widened by 1 px for observations, and by 6 sigma for measurements.",
+        Some("Noise carries measurements over the edge; sigma is the declared one, else 1 px."), "1.0.0";
+    DepthPositive: "depth-positive", Error, "Measurements",
+        "Depths MUST be positive.",
+        None, "1.0.0";
+    SegmentPixelsDistinct: "segment-pixels-distinct", Warning, "Measurements",
+        "The two ends of a segment SHOULD differ.",
+        None, "1.0.0";
+    LineFormsAgree: "line-forms-agree", Error, "Lines and groups",
+        "The three forms of a line landmark MUST say the same line, within 1e-9 rad and 1e-9 m (times the line's distance from the origin where that is over 1 m).",
+        None, "1.0.0";
+    PluckerConstraint: "plucker-constraint", Error, "Lines and groups",
+        "The direction of a line MUST have unit length and be perpendicular to the moment, within 1e-9.",
+        None, "1.0.0";
+    SegmentLength: "segment-length", Error, "Lines and groups",
+        "The ends of a line landmark MUST NOT coincide.",
+        None, "1.0.0";
+    GroupLinesKnown: "group-lines-known", Warning, "Lines and groups",
+        "Lines of a group SHOULD be in `line_landmarks`, where that table is there.",
+        None, "1.0.0";
+    GroupLinesUnique: "group-lines-unique", Error, "Lines and groups",
+        "A group MUST list at least one line, ascending without repetition, and a line MUST be in at most one group of a kind.",
+        None, "1.0.0";
+    GroupLinesParallel: "group-lines-parallel", Error, "Lines and groups",
+        "Lines of a parallel group MUST be parallel to the group's direction within 1e-3 rad, whichever way they are directed.",
+        Some("A solver may share one direction among them."), "1.0.0";
+    GroupDirection: "group-direction", Error, "Lines and groups",
+        "The direction of a group MUST be whole and of unit length within 1e-6; it may be absent only if no line of the group has a landmark.",
+        None, "1.0.0";
+    GraphVerticesKnown: "graph-vertices-known", Error, "Graphs",
+        "The vertices of a factor MUST be in the vertex tables of its graph.",
+        None, "1.0.0";
+    GraphFactorShape: "graph-factor-shape", Error, "Graphs",
+        "A factor of a registered kind MUST name the vertices, and have the numbers of `measurement` and `information`, that the registry gives.",
+        None, "1.0.0";
+    GraphInformationPositive: "graph-information-positive", Error, "Graphs",
+        "Information matrices MUST be finite and positive semi-definite.",
+        None, "1.0.0";
+    FrameStatisticsAgree: "frame-statistics-agree", Error, "Statistics of a sequence",
+        "`frame_statistics` MUST have one row for each frame, with the counts that its definition gives.",
+        None, "1.0.0";
+    PointObservationsReproject: "point-observations-reproject", Error, "Statistics of a sequence",
+        "A noise-free point observation MUST lie within 0.5 px of its landmark's image through the true pose, and its depth within 1 cm or 1 %.",
+        None, "1.0.0";
+    LineObservationsReproject: "line-observations-reproject", Warning, "Statistics of a sequence",
+        "Both ends of a noise-free line observation SHOULD lie within 0.5 px of the image of their landmark's line through the true pose.",
+        None, "1.0.0";
+    NoiseDeclared: "noise-declared", Warning, "Statistics of a sequence",
+        "A sequence with measurements SHOULD declare their noise.",
+        None, "1.0.0";
+    NoiseAgrees: "noise-agrees", Error, "Statistics of a sequence",
+        "Residuals of measurements against the truth MUST agree with the declared noise: their robust sigma (1.4826 times the median of absolute values) within 10 % and four standard errors.",
+        Some("Judged from landmarks that are where their rows see them, so that a wrong landmark is not taken for noise."), "1.0.0";
+    MeasurementsNoisy: "measurements-noisy", Advice, "Statistics of a sequence",
+        "Measurements SHOULD carry noise of at least 0.05 px.",
+        Some("On measurements that equal observations an optimiser ends at zero, which compares nothing."), "1.0.0";
+    PointLandmarksTriangulate: "point-landmarks-triangulate", Error, "Statistics of a sequence",
+        "A point landmark that at least three rows show MUST be where they triangulate to through the true poses: moving it there lowers the sum of squared residuals by at most 60 sigma².",
+        Some("Sigma is the declared one or the found one, at least 0.5 px. A right landmark exceeds 60 once in 1e12 times."), "1.0.0";
+    LineLandmarksTriangulate: "line-landmarks-triangulate", Warning, "Statistics of a sequence",
+        "A line landmark that at least three rows show SHOULD be where they triangulate to, as for points, with the distances of segment ends from the line's image.",
+        Some("Lines that were turned to be parallel after they were observed are found by this."), "1.0.0";
+}
+
+impl RuleId {
+    /// What the specification says.
+    pub(crate) fn rule(self) -> &'static Rule {
+        &RULES[self as usize]
+    }
+}
+
+/// The rule of a name.
+#[must_use]
+pub fn rule(id: &str) -> Option<&'static Rule> {
+    RULES.iter().find(|rule| rule.id == id)
+}
+
+/// A version as three numbers; `None` when it is not `major.minor.patch`.
+pub(crate) fn version_numbers(version: &str) -> Option<(u64, u64, u64)> {
+    let mut parts = version.split('.').map(|part| {
+        let plain = !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit());
+        if plain && (part == "0" || !part.starts_with('0')) { part.parse::<u64>().ok() } else { None }
+    });
+    let numbers = (parts.next()??, parts.next()??, parts.next()??);
+    parts.next().is_none().then_some(numbers)
+}
+
+/// The rules that hold for a file of a declared version: those of its major version that are not younger.
+///
+/// A version that cannot be read is taken for the oldest, so that no rule is held against a file that did not
+/// promise it. A newer minor version than the newest known brings all rules of its major version.
+#[must_use]
+pub fn rules_for(version: &str) -> Vec<&'static Rule> {
+    let declared = version_numbers(version).unwrap_or((1, 0, 0));
+    RULES
+        .iter()
+        .filter(|rule| {
+            version_numbers(rule.since).is_some_and(|since| since.0 == declared.0 && since <= declared)
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ids_are_unique_and_lead_back_to_their_rule() {
+        for (index, one) in RULES.iter().enumerate() {
+            assert_eq!(rule(one.id), Some(one));
+            assert!(RULES[..index].iter().all(|other| other.id != one.id), "{}", one.id);
+            assert!(one.id.bytes().all(|byte| byte.is_ascii_lowercase() || byte == b'-'));
+        }
+        assert_eq!(RuleId::LineLandmarksTriangulate.rule().id, "line-landmarks-triangulate");
+        assert_eq!(RuleId::LineLandmarksTriangulate as usize, RULES.len() - 1);
+    }
+
+    #[test]
+    fn the_word_of_the_statement_fits_the_severity() {
+        for rule in RULES {
+            let must = rule.statement.contains("MUST");
+            assert_eq!(must, rule.severity == Severity::Error, "{}", rule.id);
+            if rule.severity == Severity::Warning {
+                assert!(rule.statement.contains("SHOULD"), "{}", rule.id);
+            }
+            assert!(rule.statement.ends_with('.'), "{}", rule.id);
+        }
+    }
+
+    #[test]
+    fn a_file_is_held_against_the_rules_of_its_version() {
+        assert_eq!(rules_for("1.0.0").len(), RULES.len());
+        assert_eq!(rules_for("1.7.3").len(), RULES.len());
+        assert!(rules_for("2.0.0").is_empty());
+        assert_eq!(rules_for("nonsense").len(), RULES.len());
+    }
+
+    #[test]
+    fn versions_are_three_plain_numbers() {
+        assert_eq!(version_numbers("1.20.3"), Some((1, 20, 3)));
+        for wrong in [
+            "1",
+            "1.0",
+            "1.0.0.0",
+            "1.0.x",
+            "v1.0.0",
+            "1.0.-1",
+            "01.0.0",
+            "1..0",
+            "",
+            "1.0.99999999999999999999",
+        ] {
+            assert_eq!(version_numbers(wrong), None, "{wrong}");
+        }
+    }
+}

@@ -1,3 +1,6 @@
 //! Converters from raw datasets to Open-Structure sequences.
 
+pub mod command;
+pub mod family;
+pub mod release;
 pub mod text_release;

@@ -1,2 +1,34 @@
-//! The program `os-convert`.
-fn main() {}
+//! The program `os-convert`: raw datasets to sequences.
+
+use clap::Parser;
+use open_structure_converters::command::{Outcome, open_structure};
+use std::io::{self, Write as _};
+use std::process::ExitCode;
+
+/// Convert datasets to Open-Structure sequences
+#[derive(Debug, Parser)]
+#[command(name = "os-convert", version, about, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum Command {
+    OpenStructure(open_structure::Args),
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let mut stdout = io::stdout().lock();
+    let mut stderr = io::stderr();
+    let result = match &cli.command {
+        Command::OpenStructure(args) => open_structure::run(args, &mut stdout, &mut stderr),
+    };
+    let outcome = result.unwrap_or_else(|error| {
+        // Where even stderr is closed there is nobody to tell.
+        let _ = writeln!(stderr, "error: {error:#}");
+        Outcome::Failed
+    });
+    ExitCode::from(outcome.code())
+}

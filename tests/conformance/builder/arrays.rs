@@ -76,13 +76,15 @@ fn array(column: &Column, stored: &DataType, cells: &[&Cell]) -> ArrayRef {
             Arc::new(values.collect::<Float32Array>())
         }
         Kind::Boolean => {
-            let values = cells.iter().map(|cell| if let Cell::Bool(value) = cell { Some(*value) } else { None });
+            let values =
+                cells.iter().map(|cell| if let Cell::Bool(value) = cell { Some(*value) } else { None });
             Arc::new(values.collect::<BooleanArray>())
         }
         Kind::Utf8 => Arc::new(cells.iter().map(|cell| text(cell)).collect::<StringArray>()),
         Kind::LargeUtf8 => Arc::new(cells.iter().map(|cell| text(cell)).collect::<LargeStringArray>()),
         Kind::Binary => {
-            let values = cells.iter().map(|cell| if let Cell::Bytes(bytes) = cell { Some(bytes) } else { None });
+            let values =
+                cells.iter().map(|cell| if let Cell::Bytes(bytes) = cell { Some(bytes) } else { None });
             Arc::new(values.collect::<BinaryArray>())
         }
         Kind::Int64List | Kind::Int32List | Kind::Float64List | Kind::Float32List => list(stored, cells),
@@ -95,7 +97,9 @@ fn narrow(value: i64) -> i32 {
 }
 
 fn list(stored: &DataType, cells: &[&Cell]) -> ArrayRef {
-    let DataType::List(element) = stored else { return Arc::new(BooleanArray::from(vec![false; cells.len()])) };
+    let DataType::List(element) = stored else {
+        return Arc::new(BooleanArray::from(vec![false; cells.len()]));
+    };
     let (mut ints, mut floats, mut lengths) = (Vec::new(), Vec::new(), Vec::with_capacity(cells.len()));
     for cell in cells {
         lengths.push(match cell {
@@ -114,9 +118,9 @@ fn list(stored: &DataType, cells: &[&Cell]) -> ArrayRef {
     let values: ArrayRef = match element.data_type() {
         DataType::Int32 => Arc::new(ints.into_iter().map(|value| value.map(narrow)).collect::<Int32Array>()),
         DataType::Float64 => Arc::new(Float64Array::from(floats)),
-        DataType::Float32 => {
-            Arc::new(floats.into_iter().map(|value| value.map(|value| value as f32)).collect::<Float32Array>())
-        }
+        DataType::Float32 => Arc::new(
+            floats.into_iter().map(|value| value.map(|value| value as f32)).collect::<Float32Array>(),
+        ),
         _ => Arc::new(Int64Array::from(ints)),
     };
     let present: Vec<bool> = cells.iter().map(|cell| !cell.is_null()).collect();

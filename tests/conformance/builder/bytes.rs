@@ -48,7 +48,8 @@ impl BytesEdit {
         };
         let base = if self.at < 0 { end } else { start };
         let offset = isize::try_from(self.at).map_err(|error| error.to_string())?;
-        let at = base.checked_add_signed(offset).filter(|at| *at <= bytes.len()).ok_or("outside of the file")?;
+        let at =
+            base.checked_add_signed(offset).filter(|at| *at <= bytes.len()).ok_or("outside of the file")?;
         if let Some(digits) = &self.put {
             let put = hexadecimal(digits)?;
             bytes.get_mut(at..at + put.len()).ok_or("outside of the file")?.copy_from_slice(&put);

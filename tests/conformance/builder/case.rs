@@ -132,25 +132,23 @@ fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
-/// One text makes one case, or one for each entry of `each`, whose names stand in the text as `$NAME`.
+/// One text makes one case, or one for each entry of `each`, whose keys stand in the text as `$KEY`;
+/// `names` says how they are called.
 fn read(file: &Path, name: &str, base: &Value, cases: &mut Vec<Case>) -> Result<()> {
     let mut text = json(file)?;
-    let each = text.as_object_mut().and_then(|text| text.remove("each"));
-    let Some(each) = each else {
+    let map = text.as_object_mut().ok_or("not an object")?;
+    let (Some(each), Some(names)) = (map.remove("each"), map.remove("names")) else {
         cases.push(case(name.to_owned(), text, base)?);
         return Ok(());
     };
-    let each = each.as_array().ok_or("`each` is not a list")?;
-    for values in each {
+    for values in each.as_array().ok_or("`each` is not a list")? {
         let values = values.as_object().ok_or("an entry of `each` is not an object")?;
-        let mut filled = text.clone();
+        let (mut filled, mut suffix) = (text.clone(), names.clone());
         fill(&mut filled, values);
-        let words: Vec<String> = values
-            .iter()
-            .filter(|(key, _)| values.len() == 1 || !key.starts_with('_'))
-            .map(|(_, value)| value.as_str().map_or_else(|| value.to_string(), str::to_owned))
-            .collect();
-        cases.push(case(format!("{name}-{}", words.join("-")), filled, base)?);
+        fill(&mut suffix, values);
+        let suffix = suffix.as_str().ok_or("`names` is not text")?;
+        let suffix = suffix.replace(|letter: char| !letter.is_alphanumeric() && !"-_.".contains(letter), "");
+        cases.push(case(format!("{name}-{suffix}"), filled, base)?);
     }
     Ok(())
 }
@@ -168,20 +166,25 @@ fn case(name: String, text: Value, base: &Value) -> Result<Case> {
 /// Puts values in the place of their names: the whole value where a text is nothing but a name.
 fn fill(text: &mut Value, values: &Map<String, Value>) {
     match text {
-        Value::String(string) => {
-            for (name, value) in values {
-                let mark = format!("${}", name.trim_start_matches('_'));
-                if *string == mark {
-                    *text = value.clone();
-                    return;
-                }
-                if string.contains(&mark) {
-                    *string = string.replace(&mark, &value.as_str().map_or_else(|| value.to_string(), str::to_owned));
-                }
-            }
-        }
+        Value::String(string) => match values.iter().find(|(name, _)| string.strip_prefix('$') == Some(name))
+        {
+            Some((_, value)) => *text = value.clone(),
+            None => *string = filled(string, values),
+        },
         Value::Array(list) => list.iter_mut().for_each(|entry| fill(entry, values)),
-        Value::Object(map) => map.values_mut().for_each(|entry| fill(entry, values)),
+        Value::Object(map) => {
+            map.values_mut().for_each(|entry| fill(entry, values));
+            *map =
+                std::mem::take(map).into_iter().map(|(key, value)| (filled(&key, values), value)).collect();
+        }
         _ => {}
     }
+}
+
+/// A text with the values in the place of their names.
+fn filled(text: &str, values: &Map<String, Value>) -> String {
+    values.iter().fold(text.to_owned(), |text, (name, value)| {
+        let value = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+        text.replace(&format!("${name}"), &value)
+    })
 }

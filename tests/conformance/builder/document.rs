@@ -121,12 +121,20 @@ impl Cell {
             Kind::Boolean => Self::Bool(value.as_bool().ok_or_else(wrong)?),
             Kind::Utf8 | Kind::LargeUtf8 => Self::Text(value.as_str().ok_or_else(wrong)?.to_owned()),
             Kind::Binary => Self::Bytes(hexadecimal(value.as_str().ok_or_else(wrong)?)?),
-            Kind::Int64List | Kind::Int32List => Self::Ints(
-                list()?
-                    .iter()
-                    .map(|entry| if entry.is_null() { Ok(None) } else { entry.as_i64().map(Some).ok_or_else(wrong) })
-                    .collect::<Result<_>>()?,
-            ),
+            Kind::Int64List | Kind::Int32List => {
+                Self::Ints(
+                    list()?
+                        .iter()
+                        .map(|entry| {
+                            if entry.is_null() {
+                                Ok(None)
+                            } else {
+                                entry.as_i64().map(Some).ok_or_else(wrong)
+                            }
+                        })
+                        .collect::<Result<_>>()?,
+                )
+            }
             Kind::Float64List | Kind::Float32List => Self::Floats(
                 list()?
                     .iter()

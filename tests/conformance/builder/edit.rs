@@ -2,11 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::Vector3;
 use serde::Deserialize;
 use serde_json::{Map, Value};
 
 use super::Result;
 use super::document::{Cell, Column, Document, Kind, Table};
+use super::view::line_forms;
 
 type Values = Map<String, Value>;
 
@@ -30,8 +32,10 @@ pub(crate) enum Edit {
         r#where: Values,
         by: BTreeMap<String, f64>,
     },
-    /// Multiplies the differences of two tables' floats: `table` becomes `from + factor (table − from)`.
-    Scale { table: String, from: String, columns: Vec<String>, factor: f64 },
+    /// Copies values of a row from columns to others.
+    CopyValues { table: String, row: usize, from: Vec<String>, to: Vec<String> },
+    /// Moves the ends of a line landmark, metres; its three forms follow.
+    MoveLine { row: usize, start_by: [f64; 3], end_by: [f64; 3] },
     /// Inserts a row, a copy of another one where `like` is given; at the end without `at`.
     InsertRow {
         table: String,
@@ -81,6 +85,8 @@ pub(crate) enum Edit {
     SummaryRemove { table: String, value: String },
     /// Takes a table's summary out.
     DropSummary { table: String },
+    /// Lists a table's summary twice.
+    RepeatSummary { table: String },
     /// Adds a summary.
     AddSummary { values: Values },
     /// How the MCAP file is written.
@@ -115,7 +121,11 @@ fn chosen(table: &Table, row: Option<usize>, pattern: &Values) -> Result<Vec<usi
             && columns.iter().all(|(index, value)| table.rows[*number][*index] == *value)
     };
     let found: Vec<usize> = (0..table.rows.len()).filter(matching).collect();
-    if found.is_empty() { Err(format!("{}: no row is meant by {row:?} {pattern:?}", table.name)) } else { Ok(found) }
+    if found.is_empty() {
+        Err(format!("{}: no row is meant by {row:?} {pattern:?}", table.name))
+    } else {
+        Ok(found)
+    }
 }
 
 impl Edit {
@@ -124,7 +134,7 @@ impl Edit {
         match self {
             Self::Set { table, .. }
             | Self::Shift { table, .. }
-            | Self::Scale { table, .. }
+            | Self::CopyValues { table, .. }
             | Self::InsertRow { table, .. }
             | Self::DeleteRows { table, .. }
             | Self::SwapRows { table, .. }
@@ -160,17 +170,24 @@ impl Edit {
                     }
                 }
             }
-            Self::Scale { table, from, columns, factor } => {
-                let base = document.table(from).ok_or_else(|| format!("no table {from}"))?.clone();
+            Self::CopyValues { table, row, from, to } => {
                 let table = document.table_mut(table)?;
-                for (row, number) in table.rows.iter_mut().zip(0..) {
-                    for name in columns {
-                        let index = base.column(name)?;
-                        let origin = base.float(number, name);
-                        let value = row[index].float().ok_or("only floats are scaled")?;
-                        row[index] = Cell::Float(origin + factor * (value - origin));
-                    }
+                for (from, to) in from.iter().zip(to) {
+                    let (from, to) = (table.column(from)?, table.column(to)?);
+                    table.rows[*row][to] = table.rows[*row][from].clone();
                 }
+            }
+            Self::MoveLine { row, start_by, end_by } => {
+                let table = document.table_mut("line_landmarks")?;
+                let row = table.rows.get_mut(*row).ok_or("no such line")?;
+                let end = |at: usize, by: &[f64; 3]| {
+                    let numbers: Vec<f64> = row[at..at + 3].iter().filter_map(Cell::float).collect();
+                    Vector3::from_column_slice(&numbers) + Vector3::from(*by)
+                };
+                let (start, end) = (end(1, start_by), end(4, end_by));
+                let forms = line_forms(start, end);
+                let numbers = start.iter().chain(&end).chain(&forms).copied();
+                row.splice(1.., numbers.map(Cell::Float));
             }
             Self::InsertRow { table, at, like, values } => {
                 let table = document.made(table)?;
@@ -209,7 +226,12 @@ impl Edit {
                     .collect::<Result<Vec<_>>>()?;
                 let rows = rows
                     .iter()
-                    .map(|row| row.iter().zip(&columns).map(|(value, column)| Cell::parse(column.kind, value)).collect())
+                    .map(|row| {
+                        row.iter()
+                            .zip(&columns)
+                            .map(|(value, column)| Cell::parse(column.kind, value))
+                            .collect()
+                    })
                     .collect::<Result<_>>()?;
                 document.tables.push(Table { name: table.clone(), info: None, columns, rows });
             }
@@ -293,6 +315,10 @@ impl Edit {
             Self::DropSummary { table } => {
                 let index = place(table)?;
                 document.summaries.remove(index);
+            }
+            Self::RepeatSummary { table } => {
+                let copy = document.summaries[place(table)?].clone();
+                document.summaries.push(copy);
             }
             Self::AddSummary { values } => document.summaries.push(Value::Object(values.clone())),
             _ => {}

@@ -154,7 +154,8 @@ pub(crate) fn encode(document: &Document, edits: &[Edit]) -> Result<Vec<u8>> {
                 for (stamp, text) in &added.messages {
                     let data = text.clone().into_bytes();
                     let at = messages.partition_point(|message: &Message| message.stamp <= *stamp);
-                    let message = Message { topic: added.topic.clone(), stamp: *stamp, data, rows: Vec::new() };
+                    let message =
+                        Message { topic: added.topic.clone(), stamp: *stamp, data, rows: Vec::new() };
                     messages.insert(at, message);
                 }
             }
@@ -200,7 +201,11 @@ fn lay_out(document: &Document, channels: &mut Vec<Channel>, messages: &mut Vec<
         channels.push(Channel {
             topic: topic.clone(),
             message_encoding: "arrow".to_owned(),
-            schema: Some((format!("open_structure.{name}"), "arrow".to_owned(), encoded(document, table, None)?)),
+            schema: Some((
+                format!("open_structure.{name}"),
+                "arrow".to_owned(),
+                encoded(document, table, None)?,
+            )),
         });
         let per_frame = table.info.is_some_and(|info| info.storage == Storage::PerFrame);
         let frame = table.columns.iter().position(|column| column.name == "frame_id").filter(|_| per_frame);
@@ -217,7 +222,10 @@ fn lay_out(document: &Document, channels: &mut Vec<Channel>, messages: &mut Vec<
     // Whole tables have the first stamp and stay in front, the sort being stable.
     let place = |message: &Message| {
         let name = message.topic.trim_start_matches('/');
-        document.table(name).and_then(|table| table.info).is_some_and(|info| info.storage == Storage::PerFrame)
+        document
+            .table(name)
+            .and_then(|table| table.info)
+            .is_some_and(|info| info.storage == Storage::PerFrame)
     };
     messages.sort_by_key(|message| (message.stamp, place(message)));
     channels.push(json("table_summaries"));
@@ -354,12 +362,18 @@ fn write_options(options: &Options) -> Result<WriteOptions> {
         .calculate_summary_section_crc(!options.no_crcs))
 }
 
-fn write(document: &Document, options: &Options, channels: &[Channel], messages: &[Message]) -> Result<Vec<u8>> {
+fn write(
+    document: &Document,
+    options: &Options,
+    channels: &[Channel],
+    messages: &[Message],
+) -> Result<Vec<u8>> {
     let failed = |error: mcap::McapError| error.to_string();
     let mut writer = write_options(options)?.create(Cursor::new(Vec::new())).map_err(failed)?;
     let said = |name: &str| document.manifest[name].as_str().unwrap_or_default().to_owned();
-    let mut identity =
-        BTreeMap::from([("spec_version", said("spec_version")), ("name", said("name"))].map(|(k, v)| (k.to_owned(), v)));
+    let mut identity = BTreeMap::from(
+        [("spec_version", said("spec_version")), ("name", said("name"))].map(|(k, v)| (k.to_owned(), v)),
+    );
     for (name, value) in &options.identity {
         match value {
             Some(value) => identity.insert(name.clone(), value.clone()),
@@ -368,7 +382,9 @@ fn write(document: &Document, options: &Options, channels: &[Channel], messages:
     }
     let name = options.identity_name.clone().unwrap_or_else(|| "open-structure".to_owned());
     for _ in 0..options.identity_records.unwrap_or(1) {
-        writer.write_metadata(&Metadata { name: name.clone(), metadata: identity.clone() }).map_err(failed)?;
+        writer
+            .write_metadata(&Metadata { name: name.clone(), metadata: identity.clone() })
+            .map_err(failed)?;
     }
     if let Some(name) = &options.other_metadata {
         writer.write_metadata(&Metadata { name: name.clone(), metadata: BTreeMap::new() }).map_err(failed)?;

@@ -9,6 +9,7 @@ mod case;
 mod derive;
 mod document;
 mod edit;
+mod export;
 mod mcap_file;
 mod noise;
 mod parquet_files;
@@ -18,9 +19,10 @@ mod view;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-pub(crate) use case::{Case, Expected, Stored, cases};
+pub(crate) use case::{Case, Stored, cases};
 use document::Document;
 use edit::Edit;
+pub(crate) use export::export;
 
 /// What went wrong while a case was read or built, in words.
 pub(crate) type Result<T> = std::result::Result<T, String>;

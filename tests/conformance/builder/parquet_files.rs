@@ -77,7 +77,11 @@ fn file(table: &Table, version: &str, options: &Options) -> Result<Vec<u8>> {
         .set_compression(compression)
         .set_statistics_enabled(statistics)
         .set_dictionary_enabled(!options.no_dictionary)
-        .set_writer_version(if options.version_2 { WriterVersion::PARQUET_2_0 } else { WriterVersion::PARQUET_1_0 })
+        .set_writer_version(if options.version_2 {
+            WriterVersion::PARQUET_2_0
+        } else {
+            WriterVersion::PARQUET_1_0
+        })
         .set_max_row_group_row_count(Some(options.row_group_rows.unwrap_or(1 << 18)))
         .set_data_page_row_count_limit(options.page_rows.unwrap_or(1 << 13))
         .set_write_batch_size(options.page_rows.unwrap_or(1 << 10))

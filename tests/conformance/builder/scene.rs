@@ -181,7 +181,9 @@ fn ends(segment: [Vector3<f64>; 2]) -> impl Iterator<Item = Cell> {
 
 fn frames(scene: &Scene, world: &World) -> Vec<Vec<Cell>> {
     let rows = scene.frames.iter().zip(&world.placements).map(|(frame, placement)| {
-        cells(&[frame.frame_id, frame.stamp_nanos, frame.camera_id]).chain(cells(&placement.numbers())).collect()
+        cells(&[frame.frame_id, frame.stamp_nanos, frame.camera_id])
+            .chain(cells(&placement.numbers()))
+            .collect()
     });
     rows.collect()
 }
@@ -319,7 +321,9 @@ fn estimates(scene: &Scene, world: &World, add: &mut Add<'_>) -> Result<()> {
 fn diagonal(values: &[f64]) -> Cell {
     let size = values.len();
     let entries = (0..size).flat_map(|row| (row..size).map(move |column| (row, column)));
-    Cell::from(entries.map(|(row, column)| if row == column { values[row] } else { 0.0 }).collect::<Vec<f64>>())
+    Cell::from(
+        entries.map(|(row, column)| if row == column { values[row] } else { 0.0 }).collect::<Vec<f64>>(),
+    )
 }
 
 fn graph(scene: &Scene, world: &World, measured: &Rows, add: &mut Add<'_>) -> Result<()> {
@@ -331,7 +335,9 @@ fn graph(scene: &Scene, world: &World, measured: &Rows, add: &mut Add<'_>) -> Re
     let mut poses = Vec::new();
     for (index, (frame, placement)) in scene.frames.iter().zip(&world.placements).enumerate() {
         let placement = if index == 0 { *placement } else { disturbed.placement(placement) };
-        poses.push(key(frame.frame_id).chain([(index == 0).into()]).chain(cells(&placement.numbers())).collect());
+        poses.push(
+            key(frame.frame_id).chain([(index == 0).into()]).chain(cells(&placement.numbers())).collect(),
+        );
     }
     let points = scene.points.iter().zip(&world.points).map(|(point, at)| {
         let at: [f64; 3] = disturbed.point(at).into();
@@ -349,11 +355,13 @@ fn graph(scene: &Scene, world: &World, measured: &Rows, add: &mut Add<'_>) -> Re
         let number = i64::try_from(factors.len()).unwrap_or(i64::MAX);
         let numbers = Cell::Floats(measurement.iter().map(Cell::float).collect());
         let vertices = vertices.into_iter().map(|vertex| vertex.map_or(Cell::Null, Cell::Int));
-        factors.push(key(number).chain([kind.into()]).chain(vertices).chain([numbers, information]).collect());
+        factors
+            .push(key(number).chain([kind.into()]).chain(vertices).chain([numbers, information]).collect());
     };
-    let pixel = scene.noise.sigma_px.powi(-2);
-    let depth = scene.noise.sigma_depth_m.powi(-2);
-    let in_graph = |row: &&Vec<Cell>| row[0].int().is_some_and(|frame| graph.measured_frames.contains(&frame));
+    let weight = |sigma: f64| if sigma > 0.0 { sigma.powi(-2) } else { 1.0 };
+    let (pixel, depth) = (weight(scene.noise.sigma_px), weight(scene.noise.sigma_depth_m));
+    let in_graph =
+        |row: &&Vec<Cell>| row[0].int().is_some_and(|frame| graph.measured_frames.contains(&frame));
     for (index, row) in measured.points.iter().filter(in_graph).enumerate() {
         let vertices = [row[0].int(), None, row[1].int(), None, None];
         // With depth or without, with information or without, by turns.

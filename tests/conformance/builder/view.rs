@@ -51,7 +51,5 @@ pub(crate) fn line_forms(start: Vector3<f64>, end: Vector3<f64>) -> [f64; 10] {
     let frame = Matrix3::from_columns(&[first, direction, first.cross(&direction)]);
     let phi = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(frame)).scaled_axis();
     let varphi = 1.0_f64.atan2(moment.norm());
-    [
-        moment.x, moment.y, moment.z, direction.x, direction.y, direction.z, phi.x, phi.y, phi.z, varphi,
-    ]
+    [moment.x, moment.y, moment.z, direction.x, direction.y, direction.z, phi.x, phi.y, phi.z, varphi]
 }

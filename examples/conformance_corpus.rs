@@ -17,7 +17,7 @@ fn main() -> ExitCode {
     };
     match builder::export(Path::new(output)) {
         Ok(cases) => {
-            eprintln!("{cases} cases below {}", Path::new(output).display());
+            eprintln!("{} cases below {}", cases.len(), Path::new(output).display());
             ExitCode::SUCCESS
         }
         Err(error) => {

@@ -27,11 +27,11 @@ impl Stored {
         }
     }
 
-    /// Name of the file or folder that holds the case.
-    pub(crate) fn file_name(self, stem: &str) -> String {
+    /// Name of the file or folder that holds a case.
+    pub(crate) const fn file_name(self) -> &'static str {
         match self {
-            Self::Mcap => format!("{stem}.mcap"),
-            Self::Parquet => stem.to_owned(),
+            Self::Mcap => "sequence.mcap",
+            Self::Parquet => "sequence",
         }
     }
 }
@@ -69,18 +69,6 @@ pub(crate) struct Case {
     pub(crate) scene: Value,
     pub(crate) edits: Vec<Edit>,
     pub(crate) findings: Vec<Expected>,
-}
-
-impl Case {
-    /// The rule that an invalid case is about.
-    pub(crate) fn rule(&self) -> Option<&str> {
-        self.name.strip_prefix("invalid/")?.split('/').next()
-    }
-
-    /// The last part of the name.
-    pub(crate) fn stem(&self) -> &str {
-        self.name.rsplit('/').next().unwrap_or(&self.name)
-    }
 }
 
 /// The text of a case.

@@ -3,17 +3,13 @@
 use std::fs;
 use std::path::Path;
 
+use rayon::prelude::*;
 use serde_json::{Value, json};
 
 use super::{Case, Result, Stored, build, cases};
 
 /// Version of the layout that [`export`] writes, as `major.minor.patch`.
 pub(crate) const CORPUS_VERSION: &str = "1.0.0";
-
-/// Name of a case's MCAP file or Parquet folder.
-pub(crate) fn file_name(stored: Stored) -> String {
-    stored.file_name("sequence")
-}
 
 /// Findings of a case in one encoding.
 fn findings(case: &Case, stored: Stored) -> Vec<Value> {
@@ -35,7 +31,7 @@ fn findings(case: &Case, stored: Stored) -> Vec<Value> {
 /// What `expected.json` says of a case.
 fn expected(case: &Case) -> Value {
     let encodings = case.encodings.iter().map(|stored| {
-        let json = json!({ "path": file_name(*stored), "findings": findings(case, *stored) });
+        let json = json!({ "path": stored.file_name(), "findings": findings(case, *stored) });
         (stored.name().to_owned(), json)
     });
     json!({
@@ -47,26 +43,27 @@ fn expected(case: &Case) -> Value {
 }
 
 /// Writes every case below a folder that is not there yet: `<case>/sequence.mcap`, `<case>/sequence/` and
-/// `<case>/expected.json`, and the list of all in `corpus.json`. Returns the number of cases.
-pub(crate) fn export(output: &Path) -> Result<usize> {
+/// `<case>/expected.json`, and the list of all in `corpus.json`. Returns the cases.
+pub(crate) fn export(output: &Path) -> Result<Vec<Case>> {
     if output.exists() {
         return Err(format!("{}: exists already", output.display()));
     }
     let cases = cases()?;
-    let mut list = Vec::new();
-    for case in &cases {
-        let folder = output.join(&case.name);
-        fs::create_dir_all(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
-        for stored in case.encodings.iter().copied() {
-            build(case, stored, &folder.join(file_name(stored)))
-                .map_err(|error| format!("{} ({}): {error}", case.name, stored.name()))?;
-        }
-        let expected = expected(case);
-        write(&folder.join("expected.json"), &expected)?;
-        list.push(expected);
-    }
+    let list = cases.par_iter().map(|case| export_case(case, output)).collect::<Result<Vec<_>>>()?;
     write(&output.join("corpus.json"), &json!({ "corpus_version": CORPUS_VERSION, "cases": list }))?;
-    Ok(cases.len())
+    Ok(cases)
+}
+
+fn export_case(case: &Case, output: &Path) -> Result<Value> {
+    let folder = output.join(&case.name);
+    fs::create_dir_all(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    for stored in case.encodings.iter().copied() {
+        build(case, stored, &folder.join(stored.file_name()))
+            .map_err(|error| format!("{} ({}): {error}", case.name, stored.name()))?;
+    }
+    let expected = expected(case);
+    write(&folder.join("expected.json"), &expected)?;
+    Ok(expected)
 }
 
 fn write(path: &Path, json: &Value) -> Result<()> {

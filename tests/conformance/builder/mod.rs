@@ -19,7 +19,8 @@ mod view;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-pub(crate) use case::{Case, Stored, cases};
+use case::cases;
+pub(crate) use case::{Case, Stored};
 use document::Document;
 use edit::Edit;
 pub(crate) use export::export;
@@ -28,12 +29,12 @@ pub(crate) use export::export;
 pub(crate) type Result<T> = std::result::Result<T, String>;
 
 /// Where the cases lie.
-pub(crate) fn corpus_folder() -> PathBuf {
+fn corpus_folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/conformance")
 }
 
 /// Builds a case under a path: an MCAP file, or a Parquet folder.
-pub(crate) fn build(case: &Case, stored: Stored, path: &Path) -> Result<()> {
+fn build(case: &Case, stored: Stored, path: &Path) -> Result<()> {
     let document = document(case)?;
     match stored {
         Stored::Mcap => {

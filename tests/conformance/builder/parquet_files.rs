@@ -15,7 +15,7 @@ use super::{Result, arrays};
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Options {
-    /// `none`, `snappy`, `lz4` or `zstd`.
+    /// `none` (the default), `snappy`, `lz4` or `zstd`.
     compression: Option<String>,
     row_group_rows: Option<usize>,
     page_rows: Option<usize>,
@@ -66,10 +66,10 @@ pub(crate) fn encode(document: &Document, edits: &[Edit]) -> Result<BTreeMap<Str
 
 fn file(table: &Table, version: &str, options: &Options) -> Result<Vec<u8>> {
     let compression = match options.compression.as_deref() {
-        Some("none") => Compression::UNCOMPRESSED,
+        None | Some("none") => Compression::UNCOMPRESSED,
         Some("snappy") => Compression::SNAPPY,
         Some("lz4") => Compression::LZ4_RAW,
-        None | Some("zstd") => Compression::ZSTD(ZstdLevel::default()),
+        Some("zstd") => Compression::ZSTD(ZstdLevel::default()),
         Some(other) => return Err(format!("no compression is called {other}")),
     };
     let statistics = if options.no_statistics { EnabledStatistics::None } else { EnabledStatistics::Page };

@@ -6,7 +6,7 @@ use std::path::Path;
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
-use super::{Case, Result, Stored, build, cases};
+use super::{Case, Result, Stored, cases, document, store};
 
 /// Version of the layout that [`export`] writes, as `major.minor.patch`.
 pub(crate) const CORPUS_VERSION: &str = "1.0.0";
@@ -57,8 +57,9 @@ pub(crate) fn export(output: &Path) -> Result<Vec<Case>> {
 fn export_case(case: &Case, output: &Path) -> Result<Value> {
     let folder = output.join(&case.name);
     fs::create_dir_all(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    let document = document(case).map_err(|error| format!("{}: {error}", case.name))?;
     for stored in case.encodings.iter().copied() {
-        build(case, stored, &folder.join(stored.file_name()))
+        store(case, &document, stored, &folder.join(stored.file_name()))
             .map_err(|error| format!("{} ({}): {error}", case.name, stored.name()))?;
     }
     let expected = expected(case);

@@ -33,17 +33,16 @@ fn corpus_folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/conformance")
 }
 
-/// Builds a case under a path: an MCAP file, or a Parquet folder.
-fn build(case: &Case, stored: Stored, path: &Path) -> Result<()> {
-    let document = document(case)?;
+/// Stores a case's document under a path: an MCAP file, or a Parquet folder.
+fn store(case: &Case, document: &Document, stored: Stored, path: &Path) -> Result<()> {
     match stored {
         Stored::Mcap => {
-            let mut bytes = mcap_file::encode(&document, &case.edits)?;
+            let mut bytes = mcap_file::encode(document, &case.edits)?;
             bytes::edit(&mut bytes, None, &case.edits)?;
             fs::write(path, bytes).map_err(|error| format!("{}: {error}", path.display()))
         }
         Stored::Parquet => {
-            let mut files = parquet_files::encode(&document, &case.edits)?;
+            let mut files = parquet_files::encode(document, &case.edits)?;
             for (name, bytes) in &mut files {
                 bytes::edit(bytes, Some(name), &case.edits)?;
             }

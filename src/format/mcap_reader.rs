@@ -205,8 +205,20 @@ impl McapReader {
         Ok(Messages { file: self.file.clone(), reader })
     }
 
-    /// Rows of one message of a table.
-    pub(super) fn rows<R: Record>(&self, message: &Message, first_row: u64) -> Result<Option<Vec<R>>, Error> {
+    /// The table that a message belongs to.
+    pub(super) fn table_of(&self, message: &Message) -> Option<&'static str> {
+        let listed =
+            |channels: &Vec<TableChannel>| channels.iter().any(|channel| channel.id == message.channel);
+        self.channels.iter().find(|(_, channels)| listed(channels)).map(|(table, _)| *table)
+    }
+
+    /// Appends the rows of one message, if it is one of their table, and says whether it is.
+    pub(super) fn rows_into<R: Record>(
+        &self,
+        message: Message,
+        first_row: u64,
+        rows: &mut Vec<R>,
+    ) -> Result<bool, Error> {
         let Some(channel) = self
             .channels
             .get(R::TABLE.name)
@@ -214,19 +226,19 @@ impl McapReader {
             .flatten()
             .find(|channel| channel.id == message.channel)
         else {
-            return Ok(None);
+            return Ok(false);
         };
         guarded(self.path(), "Arrow", || {
-            let batch = decode_batch(&message.data, Arc::clone(&channel.schema)).map_err(|error| {
-                Error::Container {
+            let Message { log_time, data, .. } = message;
+            let batch =
+                decode_batch(data, Arc::clone(&channel.schema)).map_err(|error| Error::Container {
                     path: self.path().to_owned(),
                     container: "Arrow",
-                    detail: format!("{} message at {} ns: {error}", R::TABLE.name, message.log_time),
-                }
-            })?;
-            from_batch(&batch, first_row)
-        })
-        .map(Some)
+                    detail: format!("{} message at {log_time} ns: {error}", R::TABLE.name),
+                })?;
+            from_batch(&batch, first_row, rows)
+        })?;
+        Ok(true)
     }
 
     /// Reads the whole file once and checks every CRC of the container.

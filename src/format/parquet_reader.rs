@@ -70,6 +70,13 @@ impl ParquetTableReader {
         &self.stored
     }
 
+    /// Rows for which room may be made before they are seen: those that the footer claims, as long as
+    /// there is a byte of file for each.
+    pub(super) fn plausible_rows(&self) -> usize {
+        let claimed = self.stored.rows.unwrap_or(0).min(self.file.length());
+        usize::try_from(claimed).unwrap_or(0)
+    }
+
     /// The footer, as the validator wants to see it.
     pub(super) fn footer(&self) -> &ParquetMetaData {
         self.metadata.metadata()
@@ -182,15 +189,21 @@ pub(super) struct ParquetBatches {
 impl ParquetBatches {
     /// The next rows; `None` at the end.
     pub(super) fn next_rows<R: Record>(&mut self) -> Option<Result<Vec<R>, Error>> {
+        let mut rows = Vec::new();
+        Some(self.next_into(&mut rows)?.map(|()| rows))
+    }
+
+    /// Appends the next rows; `None` at the end.
+    pub(super) fn next_into<R: Record>(&mut self, rows: &mut Vec<R>) -> Option<Result<(), Error>> {
         let Self { file, reader, row } = self;
         let path = file.path();
         let result = guarded(path, "Parquet", || match reader.as_mut().and_then(Iterator::next) {
             None => Ok(None),
             Some(batch) => {
                 let batch = batch.map_err(|error| Error::container(path, "Parquet")(error.into()))?;
-                let rows: Vec<R> = from_batch(&batch, *row)?;
-                *row += rows.len() as u64;
-                Ok(Some(rows))
+                from_batch(&batch, *row, rows)?;
+                *row += batch.num_rows() as u64;
+                Ok(Some(()))
             }
         })
         .transpose();

@@ -1,0 +1,105 @@
+//! A figure: what was measured, and the bound it has to keep.
+
+use std::fmt;
+use std::time::{Duration, Instant};
+
+/// What a figure has to keep.
+#[derive(Clone, Copy, Debug)]
+pub enum Bound {
+    /// At least so much.
+    AtLeast(f64),
+    /// At most so much.
+    AtMost(f64),
+    /// Nothing; told for comparison.
+    None,
+}
+
+/// One line of the table.
+struct Figure {
+    name: String,
+    value: f64,
+    unit: &'static str,
+    bound: Bound,
+}
+
+impl Figure {
+    fn holds(&self) -> bool {
+        match self.bound {
+            Bound::AtLeast(least) => self.value >= least,
+            Bound::AtMost(most) => self.value <= most,
+            Bound::None => true,
+        }
+    }
+}
+
+/// What was measured in this run.
+#[derive(Default)]
+pub struct Figures {
+    figures: Vec<Figure>,
+}
+
+impl Figures {
+    /// Adds a figure.
+    pub fn add(&mut self, name: impl Into<String>, value: f64, unit: &'static str, bound: Bound) {
+        let figure = Figure { name: name.into(), value, unit, bound };
+        eprintln!("{}: {} {}", figure.name, digits(value), unit);
+        self.figures.push(figure);
+    }
+
+    /// Whether every bound holds.
+    pub fn hold(&self) -> bool {
+        self.figures.iter().all(Figure::holds)
+    }
+}
+
+/// Three or four significant digits.
+fn digits(value: f64) -> String {
+    match value.abs() {
+        large if large >= 1000.0 => format!("{value:.0}"),
+        large if large >= 10.0 => format!("{value:.1}"),
+        large if large >= 0.1 => format!("{value:.2}"),
+        _ => format!("{value:.5}"),
+    }
+}
+
+impl fmt::Display for Figures {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "| figure | measured | bound | holds |")?;
+        writeln!(f, "|---|--:|--:|---|")?;
+        for figure in &self.figures {
+            let (bound, holds) = match figure.bound {
+                Bound::AtLeast(least) => (format!("≥ {}", digits(least)), figure.holds()),
+                Bound::AtMost(most) => (format!("≤ {}", digits(most)), figure.holds()),
+                Bound::None => {
+                    writeln!(f, "| {} | {} {} | | |", figure.name, digits(figure.value), figure.unit)?;
+                    continue;
+                }
+            };
+            let holds = if holds { "yes" } else { "NO" };
+            writeln!(
+                f,
+                "| {} | {} {} | {bound} | {holds} |",
+                figure.name,
+                digits(figure.value),
+                figure.unit
+            )?;
+        }
+        Ok(())
+    }
+}
+
+/// The median time of some runs, after one that warms up.
+pub fn median_time<T>(runs: usize, mut run: impl FnMut() -> T) -> Duration {
+    drop(run());
+    let mut times: Vec<Duration> = (0..runs)
+        .map(|_| {
+            let start = Instant::now();
+            let result = run();
+            let time = start.elapsed();
+            drop(result);
+            time
+        })
+        .collect();
+    times.sort_unstable();
+    times[runs / 2]
+}

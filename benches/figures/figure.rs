@@ -90,16 +90,30 @@ impl fmt::Display for Figures {
 
 /// The median time of some runs, after one that warms up.
 pub fn median_time<T>(runs: usize, mut run: impl FnMut() -> T) -> Duration {
-    drop(run());
-    let mut times: Vec<Duration> = (0..runs)
-        .map(|_| {
-            let start = Instant::now();
-            let result = run();
-            let time = start.elapsed();
-            drop(result);
-            time
-        })
+    let mut times: Vec<Duration> = (0..=runs).map(|_| time_of(&mut run)).skip(1).collect();
+    median(&mut times)
+}
+
+/// The median of how many times longer the first takes than the second, run in turn, so that both meet
+/// the same machine.
+pub fn median_ratio<T, U>(runs: usize, mut first: impl FnMut() -> T, mut second: impl FnMut() -> U) -> f64 {
+    let mut ratios: Vec<f64> = (0..=runs)
+        .map(|_| time_of(&mut first).as_secs_f64() / time_of(&mut second).as_secs_f64())
+        .skip(1)
         .collect();
+    ratios.sort_unstable_by(f64::total_cmp);
+    ratios[ratios.len() / 2]
+}
+
+fn median(times: &mut [Duration]) -> Duration {
     times.sort_unstable();
-    times[runs / 2]
+    times[times.len() / 2]
+}
+
+fn time_of<T>(run: &mut impl FnMut() -> T) -> Duration {
+    let start = Instant::now();
+    let result = run();
+    let time = start.elapsed();
+    drop(result);
+    time
 }

@@ -27,7 +27,7 @@ use crate::structure::TableInfo;
 /// Rows of a row group: enough to compress, few enough to hold several of them.
 pub(super) const ROW_GROUP_ROWS: usize = 1 << 18;
 /// Rows of a data page: what is read, at least, to see one frame.
-const PAGE_ROWS: usize = 1 << 13;
+const PAGE_ROWS: usize = 1 << 14;
 /// Room for a dictionary of a whole row group of floats, so that a chunk is encoded one way throughout.
 const DICTIONARY_BYTES: usize = ROW_GROUP_ROWS * 16;
 

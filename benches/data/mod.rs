@@ -13,16 +13,16 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
 /// One published file of observations.
-pub struct Published {
+pub(crate) struct Published {
     /// Sequence and file.
-    pub name: String,
+    pub(crate) name: String,
     /// The lines of observations alone.
-    pub text: Vec<u8>,
+    pub(crate) text: Vec<u8>,
 }
 
 impl Published {
     /// Reads the association file of `observation.zip` or the graph of `baseline.zip`.
-    pub fn read(folder: &Path, archive: &str, file: &str) -> Result<Self> {
+    pub(crate) fn read(folder: &Path, archive: &str, file: &str) -> Result<Self> {
         let path = folder.join(archive);
         let opened = File::open(&path).with_context(|| path.display().to_string())?;
         let mut archive = ZipArchive::new(opened)?;
@@ -42,12 +42,12 @@ impl Published {
     }
 
     /// The rows, as the project's own parser reads them.
-    pub fn parse(&self) -> Rows {
+    pub(crate) fn parse(&self) -> Rows {
         parse(&self.text, None, &mut FileProblems::new(&self.name))
     }
 
     /// Bytes that a zip archive needs for the same lines.
-    pub fn zipped_bytes(&self) -> Result<u64> {
+    pub(crate) fn zipped_bytes(&self) -> Result<u64> {
         let mut writer = ZipWriter::new(Cursor::new(Vec::new()));
         let options = SimpleFileOptions::default().compression_method(CompressionMethod::Deflated);
         writer.start_file("association.txt", options)?;
@@ -57,7 +57,7 @@ impl Published {
     }
 
     /// The same rows as a sequence of measurements.
-    pub fn sequence(&self) -> Sequence {
+    pub(crate) fn sequence(&self) -> Sequence {
         let rows = self.parse();
         let mut sequence = Sequence {
             manifest: Manifest { name: self.name.clone(), ..Manifest::default() },
@@ -98,14 +98,14 @@ impl Published {
 }
 
 /// Where the published sequences lie, if they are here.
-pub fn published_folder() -> Option<PathBuf> {
+pub(crate) fn published_folder() -> Option<PathBuf> {
     let data = std::env::var_os("OPEN_STRUCTURE_DATA")
         .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
     Some(data.join("open-structure")).filter(|folder| folder.is_dir())
 }
 
 /// Every published file of observations, by sequence.
-pub fn published() -> Result<Vec<Published>> {
+pub(crate) fn published() -> Result<Vec<Published>> {
     let Some(folder) = published_folder() else { return Ok(Vec::new()) };
     let mut sequences: Vec<PathBuf> =
         std::fs::read_dir(folder)?.map(|entry| Ok(entry?.path())).collect::<std::io::Result<_>>()?;
@@ -124,16 +124,16 @@ pub fn published() -> Result<Vec<Published>> {
 }
 
 /// A frame of a camera at 30 Hz.
-pub fn frame(frame_id: FrameId) -> Frame {
+pub(crate) fn frame(frame_id: FrameId) -> Frame {
     Frame::new(frame_id, frame_id.0 * 33_333_333, CameraId(0), None)
 }
 
 /// Draws numbers in `[0, 1)`: splitmix64, so that every run measures the same bytes.
-pub struct Draw(pub u64);
+pub(crate) struct Draw(pub(crate) u64);
 
 impl Draw {
     /// The next number.
-    pub fn next(&mut self) -> f64 {
+    pub(crate) fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut bits = self.0;
         bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -144,7 +144,7 @@ impl Draw {
 
 /// The measurements of one frame of a synthetic sequence: `points` landmarks in view, which drift through
 /// the image as frames go by; positions and depths have noise in every digit.
-pub fn synthetic_frame(frame_id: FrameId, points: i64, rows: &mut Vec<PointMeasurement>) {
+pub(crate) fn synthetic_frame(frame_id: FrameId, points: i64, rows: &mut Vec<PointMeasurement>) {
     let mut draw = Draw(frame_id.0.cast_unsigned());
     rows.clear();
     rows.extend((0..points).map(|place| {
@@ -164,7 +164,7 @@ pub fn synthetic_frame(frame_id: FrameId, points: i64, rows: &mut Vec<PointMeasu
 }
 
 /// A synthetic sequence in memory.
-pub fn synthetic(frames: i64, points: i64) -> Sequence {
+pub(crate) fn synthetic(frames: i64, points: i64) -> Sequence {
     let mut sequence = Sequence::default();
     sequence.manifest.name = "synthetic".to_owned();
     let mut rows = Vec::new();

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 /// What a figure has to keep.
 #[derive(Clone, Copy, Debug)]
-pub enum Bound {
+pub(crate) enum Bound {
     /// At least so much.
     AtLeast(f64),
     /// At most so much.
@@ -34,20 +34,20 @@ impl Figure {
 
 /// What was measured in this run.
 #[derive(Default)]
-pub struct Figures {
+pub(crate) struct Figures {
     figures: Vec<Figure>,
 }
 
 impl Figures {
     /// Adds a figure.
-    pub fn add(&mut self, name: impl Into<String>, value: f64, unit: &'static str, bound: Bound) {
+    pub(crate) fn add(&mut self, name: impl Into<String>, value: f64, unit: &'static str, bound: Bound) {
         let figure = Figure { name: name.into(), value, unit, bound };
         eprintln!("{}: {} {}", figure.name, digits(value), unit);
         self.figures.push(figure);
     }
 
     /// Whether every bound holds.
-    pub fn hold(&self) -> bool {
+    pub(crate) fn hold(&self) -> bool {
         self.figures.iter().all(Figure::holds)
     }
 }
@@ -89,14 +89,14 @@ impl fmt::Display for Figures {
 }
 
 /// The median time of some runs, after one that warms up.
-pub fn median_time<T>(runs: usize, mut run: impl FnMut() -> T) -> Duration {
+pub(crate) fn median_time<T>(runs: usize, mut run: impl FnMut() -> T) -> Duration {
     let mut times: Vec<Duration> = (0..=runs).map(|_| time_of(&mut run)).skip(1).collect();
     median(&mut times)
 }
 
 /// The median of how many times longer the first takes than the second, run in turn, so that both meet
 /// the same machine.
-pub fn median_ratio<T, U>(runs: usize, mut first: impl FnMut() -> T, mut second: impl FnMut() -> U) -> f64 {
+pub(crate) fn median_ratio<T, U>(runs: usize, mut first: impl FnMut() -> T, mut second: impl FnMut() -> U) -> f64 {
     let mut ratios: Vec<f64> = (0..=runs)
         .map(|_| time_of(&mut first).as_secs_f64() / time_of(&mut second).as_secs_f64())
         .skip(1)

@@ -13,7 +13,7 @@ use crate::figure::{Bound, Figures, median_ratio, median_time};
 const RUNS: usize = 15;
 
 /// Reading rows on one core, from noisy numbers and from the digits of a published sequence.
-pub fn measure(figures: &mut Figures) -> Result<()> {
+pub(crate) fn measure(figures: &mut Figures) -> Result<()> {
     let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR"))?;
     let noisy = synthetic(800, 5000);
     points(figures, "noisy", &noisy, folder.path())?;

@@ -28,12 +28,12 @@ fn frames() -> Result<i64> {
 }
 
 /// Whether this process is to write and nothing else.
-pub fn is_child() -> bool {
+pub(crate) fn is_child() -> bool {
     env::var_os(CHILD).is_some()
 }
 
 /// Writes the sequence, and prints the process's greatest resident memory in KiB.
-pub fn write_as_child() -> Result<()> {
+pub(crate) fn write_as_child() -> Result<()> {
     let path = PathBuf::from(env::var_os(CHILD).context("no output")?);
     let list: Vec<_> = (0..frames()?).map(|id| frame(FrameId(id))).collect();
     let manifest = Manifest { name: "synthetic".to_owned(), ..Manifest::default() };
@@ -52,7 +52,7 @@ pub fn write_as_child() -> Result<()> {
 }
 
 /// Writes in a child process, then reads one frame from the middle.
-pub fn measure(figures: &mut Figures) -> Result<()> {
+pub(crate) fn measure(figures: &mut Figures) -> Result<()> {
     let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR"))?;
     let frames = frames()?;
     let rows = frames as f64 * POINTS as f64 / 1e6;

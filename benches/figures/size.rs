@@ -10,7 +10,7 @@ use crate::data::{Published, published, synthetic};
 use crate::figure::{Bound, Figures};
 
 /// Both tables of each published file against a zip of the same lines.
-pub fn measure(figures: &mut Figures) -> Result<()> {
+pub(crate) fn measure(figures: &mut Figures) -> Result<()> {
     let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR"))?;
     let files = published()?;
     if files.is_empty() {

@@ -1,6 +1,5 @@
 //! Both encodings give back what was written, bit by bit.
 
-#[path = "round_trip/arbitrary.rs"]
 mod arbitrary;
 
 use std::fs;

@@ -4,11 +4,13 @@ mod cat;
 mod completions;
 mod convert;
 mod copy;
+mod explain;
 mod info;
 mod man;
 mod progress;
 mod schema;
 mod text;
+mod validate;
 
 use std::io::{self, IsTerminal, Write};
 use std::process::ExitCode;
@@ -34,6 +36,8 @@ struct Cli {
 
 #[derive(Subcommand, Debug)]
 enum Command {
+    Validate(validate::Args),
+    Explain(explain::Args),
     Info(info::Args),
     Cat(cat::Args),
     Copy(copy::Args),
@@ -65,6 +69,8 @@ pub fn main() -> ExitCode {
     });
     let mut stdout = io::BufWriter::new(io::stdout().lock());
     let result = match &cli.command {
+        Command::Validate(args) => validate::run(args, &mut stdout),
+        Command::Explain(args) => explain::run(args, &mut stdout),
         Command::Info(args) => info::run(args, &mut stdout),
         Command::Cat(args) => cat::run(args, &mut stdout),
         Command::Copy(args) => copy::run(args, &mut stdout),

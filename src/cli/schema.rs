@@ -7,6 +7,7 @@ use anyhow::Context;
 use super::{Outcome, text};
 use crate::format;
 use crate::structure::{TABLES, table_info};
+use crate::validate;
 
 /// Print a schema of the format: JSON Schema, or the columns of a table.
 #[derive(clap::Args, Debug)]
@@ -53,7 +54,8 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         )?;
         return Ok(Outcome::Done);
     }
-    let schema = format::json_schema(name);
+    let schema =
+        if name == "validation_report" { Some(validate::report_schema()) } else { format::json_schema(name) };
     let schema = schema.with_context(|| format!("there is no schema `{name}`; try `os schema`"))?;
     write!(stdout, "{schema}")?;
     Ok(Outcome::Done)

@@ -26,21 +26,21 @@ pub(super) fn to_batch<R: Record>(
     RecordBatch::try_new(Arc::clone(schema), sink.columns)
 }
 
-/// Rows of one record batch; `first_row` is the number of its first row, for messages.
+/// Appends the rows of one record batch; `first_row` is the number of its first row, for messages.
 ///
 /// Columns are found by name; unknown ones are passed over; absent nullable ones are all null.
-pub(super) fn from_batch<R: Record>(batch: &RecordBatch, first_row: u64) -> Result<Vec<R>, Error> {
+pub(super) fn from_batch<R: Record>(
+    batch: &RecordBatch,
+    first_row: u64,
+    rows: &mut Vec<R>,
+) -> Result<(), Error> {
     let mut columns = Vec::with_capacity(R::TABLE.fields.len());
     for field in R::TABLE.fields {
         columns.push(column(batch, R::TABLE.name, field)?);
     }
-    R::take(&Batch {
-        table: R::TABLE.name,
-        fields: R::TABLE.fields,
-        columns,
-        rows: batch.num_rows(),
-        first_row,
-    })
+    let source =
+        Batch { table: R::TABLE.name, fields: R::TABLE.fields, columns, rows: batch.num_rows(), first_row };
+    R::take(&source, rows)
 }
 
 fn column(batch: &RecordBatch, table: &'static str, field: &'static Field) -> Result<ArrayRef, Error> {

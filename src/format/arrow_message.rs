@@ -69,9 +69,11 @@ pub(super) fn decode_schema(bytes: &[u8]) -> Result<Schema, ArrowError> {
 }
 
 /// The record batch of an encapsulated message.
-pub(super) fn decode_batch(bytes: &[u8], schema: SchemaRef) -> Result<RecordBatch, ArrowError> {
+pub(super) fn decode_batch(bytes: Vec<u8>, schema: SchemaRef) -> Result<RecordBatch, ArrowError> {
     let corrupt = |what: &str| ArrowError::ParseError(what.to_owned());
-    let rest = bytes.strip_prefix(&CONTINUATION).unwrap_or(bytes);
+    // The columns of the batch are views of this buffer.
+    let bytes = Buffer::from_vec(bytes);
+    let rest = bytes.strip_prefix(&CONTINUATION).unwrap_or(&bytes);
     let (length, rest) =
         rest.split_first_chunk::<4>().ok_or_else(|| corrupt("message shorter than its length"))?;
     let length =
@@ -88,7 +90,7 @@ pub(super) fn decode_batch(bytes: &[u8], schema: SchemaRef) -> Result<RecordBatc
     if batch.compression().is_some() {
         return Err(corrupt("compressed body; chunks compress, messages must not"));
     }
-    let body = Buffer::from(body);
+    let body = bytes.slice(bytes.len() - body.len());
     RecordBatchDecoder::try_new(&body, batch, schema, &HashMap::new(), &message.version())?
         .with_require_alignment(false)
         .read_record_batch()

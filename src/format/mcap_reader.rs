@@ -26,6 +26,10 @@ use crate::structure::{Manifest, Record, TableSummary, table_info};
 pub(super) const MAX_CHUNK_BYTES: u64 = 1 << 29;
 /// Largest plausible ratio of a chunk's sizes; zstd reaches a few thousand on constant data.
 pub(super) const MAX_CHUNK_RATIO: u64 = 1 << 16;
+/// Largest plausible ratio of all chunks together, uncompressed, to the file.
+const MAX_RATIO: u64 = 512;
+/// Uncompressed size that any file may have, however well it compresses.
+const ALWAYS_PERMITTED_BYTES: u64 = 1 << 26;
 
 /// A table's channel.
 #[derive(Clone, Debug)]
@@ -48,18 +52,7 @@ impl McapReader {
     pub(super) fn open(path: &Path, bytes_read: Arc<AtomicU64>) -> Result<(Self, Damaged), Error> {
         let file = CountedFile::open(path, bytes_read)?;
         let summary = guarded(path, "MCAP", || read_summary(&file))?;
-        for chunk in &summary.chunk_indexes {
-            let limit = chunk.compressed_size.saturating_mul(MAX_CHUNK_RATIO).min(MAX_CHUNK_BYTES);
-            if chunk.uncompressed_size > limit {
-                let what = format!("a chunk's uncompressed size (at byte {})", chunk.chunk_start_offset);
-                return Err(Error::TooLarge {
-                    path: path.to_owned(),
-                    what,
-                    found: chunk.uncompressed_size,
-                    limit,
-                });
-            }
-        }
+        check_chunks(path, &summary, file.length())?;
         let mut channels: BTreeMap<&'static str, Vec<TableChannel>> = BTreeMap::new();
         let (mut stored, mut passed_over, mut damaged) = (Vec::new(), Vec::new(), Vec::new());
         let mut listed: Vec<_> = summary.channels.values().collect();
@@ -190,8 +183,20 @@ impl McapReader {
         Ok(Messages { file: self.file.clone(), reader })
     }
 
-    /// Rows of one message of a table.
-    pub(super) fn rows<R: Record>(&self, message: &Message, first_row: u64) -> Result<Option<Vec<R>>, Error> {
+    /// The table that a message belongs to.
+    pub(super) fn table_of(&self, message: &Message) -> Option<&'static str> {
+        let listed =
+            |channels: &Vec<TableChannel>| channels.iter().any(|channel| channel.id == message.channel);
+        self.channels.iter().find(|(_, channels)| listed(channels)).map(|(table, _)| *table)
+    }
+
+    /// Appends the rows of one message, if it is one of their table, and says whether it is.
+    pub(super) fn rows_into<R: Record>(
+        &self,
+        message: Message,
+        first_row: u64,
+        rows: &mut Vec<R>,
+    ) -> Result<bool, Error> {
         let Some(channel) = self
             .channels
             .get(R::TABLE.name)
@@ -199,19 +204,19 @@ impl McapReader {
             .flatten()
             .find(|channel| channel.id == message.channel)
         else {
-            return Ok(None);
+            return Ok(false);
         };
         guarded(self.path(), "Arrow", || {
-            let batch = decode_batch(&message.data, Arc::clone(&channel.schema)).map_err(|error| {
-                Error::Container {
+            let Message { log_time, data, .. } = message;
+            let batch =
+                decode_batch(data, Arc::clone(&channel.schema)).map_err(|error| Error::Container {
                     path: self.path().to_owned(),
                     container: "Arrow",
-                    detail: format!("{} message at {} ns: {error}", R::TABLE.name, message.log_time),
-                }
-            })?;
-            from_batch(&batch, first_row)
-        })
-        .map(Some)
+                    detail: format!("{} message at {log_time} ns: {error}", R::TABLE.name),
+                })?;
+            from_batch(&batch, first_row, rows)
+        })?;
+        Ok(true)
     }
 
     /// Reads the whole file once and checks every CRC of the container.
@@ -317,6 +322,30 @@ impl Iterator for Messages {
         }
         result
     }
+}
+
+/// Refuses an index whose chunks would not fit into the file, or would take much more memory than files do.
+fn check_chunks(path: &Path, summary: &Summary, length: u64) -> Result<(), Error> {
+    let too_large =
+        |what: String, found, limit| Err(Error::TooLarge { path: path.to_owned(), what, found, limit });
+    let (mut compressed, mut uncompressed) = (0_u64, 0_u64);
+    for chunk in &summary.chunk_indexes {
+        if chunk.uncompressed_size > MAX_CHUNK_BYTES {
+            let what = format!("a chunk's uncompressed size (at byte {})", chunk.chunk_start_offset);
+            return too_large(what, chunk.uncompressed_size, MAX_CHUNK_BYTES);
+        }
+        compressed = compressed.saturating_add(chunk.compressed_size);
+        uncompressed = uncompressed.saturating_add(chunk.uncompressed_size);
+    }
+    if compressed > length {
+        // Chunks that overlap would be read, and their rows taken, again and again.
+        return too_large("size of all chunks".to_owned(), compressed, length);
+    }
+    let limit = length.saturating_mul(MAX_RATIO).saturating_add(ALWAYS_PERMITTED_BYTES);
+    if uncompressed > limit {
+        return too_large("uncompressed size of all chunks".to_owned(), uncompressed, limit);
+    }
+    Ok(())
 }
 
 fn read_summary(file: &CountedFile) -> Result<Summary, Error> {

@@ -22,8 +22,15 @@ use crate::structure::{FrameId, Record, TableInfo};
 
 /// Rows decoded at once: columns of a batch stay in the cache.
 const BATCH_ROWS: usize = 1 << 13;
-/// Largest plausible number of rows per byte of file; constant columns reach a few hundred.
-const MAX_ROWS_PER_BYTE: u64 = 1 << 12;
+/// Largest plausible number of rows per byte of file: keys differ from row to row, so even constant
+/// columns stay below a hundred.
+const MAX_ROWS_PER_BYTE: u64 = 256;
+/// Rows that any file may have, however few bytes they take.
+const ALWAYS_PERMITTED_ROWS: u64 = 1 << 20;
+/// Largest plausible ratio of decoded columns to the file.
+const MAX_RATIO: u64 = 512;
+/// Size that decoded columns may have, however few bytes they take.
+const ALWAYS_PERMITTED_BYTES: u64 = 1 << 28;
 
 /// A table's file, its footer read.
 pub(super) struct ParquetTableReader {
@@ -47,13 +54,8 @@ impl ParquetTableReader {
             ArrowReaderMetadata::load(&file, options)
                 .map_err(|error| Error::container(path, "Parquet")(error.into()))
         })?;
-        let rows = metadata.metadata().file_metadata().num_rows();
-        let rows = u64::try_from(rows).map_err(|_| Error::Container {
-            path: path.to_owned(),
-            container: "Parquet",
-            detail: format!("{rows} rows"),
-        })?;
-        let limit = file.length().saturating_mul(MAX_ROWS_PER_BYTE);
+        let rows = claimed_rows(path, metadata.metadata())?;
+        let limit = file.length().saturating_mul(MAX_ROWS_PER_BYTE).saturating_add(ALWAYS_PERMITTED_ROWS);
         if rows > limit {
             return Err(Error::TooLarge {
                 path: path.to_owned(),
@@ -68,6 +70,13 @@ impl ParquetTableReader {
 
     pub(super) fn stored(&self) -> &StoredTable {
         &self.stored
+    }
+
+    /// Rows for which room may be made before they are seen: those that the footer claims, as long as
+    /// there is a byte of file for each.
+    pub(super) fn plausible_rows(&self) -> usize {
+        let claimed = self.stored.rows.unwrap_or(0).min(self.file.length());
+        usize::try_from(claimed).unwrap_or(0)
     }
 
     /// The footer, as the validator wants to see it.
@@ -96,7 +105,7 @@ impl ParquetTableReader {
             })
             .collect();
         if groups.is_empty() {
-            return Ok(ParquetBatches { file: self.file.clone(), reader: None, row: 0 });
+            return Ok(ParquetBatches { file: self.file.clone(), reader: None, row: 0, decoded: 0 });
         }
         guarded(path, "Parquet", || {
             let options = ArrowReaderOptions::new()
@@ -141,8 +150,28 @@ impl ParquetTableReader {
                 builder = builder.with_row_groups(groups).with_row_selection(RowSelection::from(selection));
             }
             let reader = builder.build().map_err(|error| Error::container(path, "Parquet")(error.into()))?;
-            Ok(ParquetBatches { file: self.file.clone(), reader: Some(reader), row: 0 })
+            Ok(ParquetBatches { file: self.file.clone(), reader: Some(reader), row: 0, decoded: 0 })
         })
+    }
+}
+
+/// Rows of the file as its footer and its row groups say, which have to agree.
+fn claimed_rows(path: &Path, footer: &ParquetMetaData) -> Result<u64, Error> {
+    let whole = footer.file_metadata().num_rows();
+    let groups = footer.row_groups().iter().try_fold(0_i64, |sum, group| {
+        let rows = group.num_rows();
+        if rows < 0 { None } else { sum.checked_add(rows) }
+    });
+    match u64::try_from(whole) {
+        Ok(rows) if groups == Some(whole) => Ok(rows),
+        _ => Err(Error::Container {
+            path: path.to_owned(),
+            container: "Parquet",
+            detail: match groups {
+                Some(groups) => format!("{whole} rows, but {groups} in its row groups"),
+                None => format!("{whole} rows, but a row group of less than none or more than can be"),
+            },
+        }),
     }
 }
 
@@ -177,20 +206,39 @@ pub(super) struct ParquetBatches {
     file: CountedFile,
     reader: Option<ParquetRecordBatchReader>,
     row: u64,
+    /// Bytes of the columns decoded so far.
+    decoded: u64,
 }
 
 impl ParquetBatches {
     /// The next rows; `None` at the end.
     pub(super) fn next_rows<R: Record>(&mut self) -> Option<Result<Vec<R>, Error>> {
-        let Self { file, reader, row } = self;
+        let mut rows = Vec::new();
+        Some(self.next_into(&mut rows)?.map(|()| rows))
+    }
+
+    /// Appends the next rows; `None` at the end.
+    pub(super) fn next_into<R: Record>(&mut self, rows: &mut Vec<R>) -> Option<Result<(), Error>> {
+        let Self { file, reader, row, decoded } = self;
         let path = file.path();
+        let limit = file.length().saturating_mul(MAX_RATIO).saturating_add(ALWAYS_PERMITTED_BYTES);
         let result = guarded(path, "Parquet", || match reader.as_mut().and_then(Iterator::next) {
             None => Ok(None),
             Some(batch) => {
                 let batch = batch.map_err(|error| Error::container(path, "Parquet")(error.into()))?;
-                let rows: Vec<R> = from_batch(&batch, *row)?;
-                *row += rows.len() as u64;
-                Ok(Some(rows))
+                *decoded = decoded.saturating_add(batch.get_array_memory_size() as u64);
+                if *decoded > limit {
+                    // A few bytes of dictionary and of run lengths can stand for any number of long values.
+                    return Err(Error::TooLarge {
+                        path: path.to_owned(),
+                        what: "decoded size of the columns".to_owned(),
+                        found: *decoded,
+                        limit,
+                    });
+                }
+                from_batch(&batch, *row, rows)?;
+                *row += batch.num_rows() as u64;
+                Ok(Some(()))
             }
         })
         .transpose();

@@ -27,11 +27,16 @@ use crate::structure::TableInfo;
 /// Rows of a row group: enough to compress, few enough to hold several of them.
 pub(super) const ROW_GROUP_ROWS: usize = 1 << 18;
 /// Rows of a data page: what is read, at least, to see one frame.
-const PAGE_ROWS: usize = 1 << 13;
+const PAGE_ROWS: usize = 1 << 14;
 /// Room for a dictionary of a whole row group of floats, so that a chunk is encoded one way throughout.
 const DICTIONARY_BYTES: usize = ROW_GROUP_ROWS * 16;
 
-/// How the values of a column chunk may be laid out; each chunk takes the one that comes out smallest.
+/// The layouts are compared in the first of so many row groups; the others take the winner.
+const COMPARE_EVERY: usize = 16;
+/// Growth in bytes a row at which a column's layouts are compared sooner.
+const TOLERATED_GROWTH: f64 = 1.1;
+
+/// How the values of a column chunk may be laid out; the one that comes out smallest is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Layout {
     /// Distinct values once, rows as references: best for values that recur.
@@ -40,7 +45,8 @@ enum Layout {
     ByteStreamSplit,
     /// Differences between neighbours: best for ascending ids.
     Delta,
-    /// Values one after the other: best for floats of few decimals.
+    /// Values one after the other: best for floats of few decimals, and for ids that come in runs
+    /// which were there a frame before.
     Plain,
 }
 
@@ -53,11 +59,19 @@ impl Layout {
         }
     }
 
+    /// Level of zstd.
+    fn level(self) -> Result<ZstdLevel, ParquetError> {
+        ZstdLevel::try_new(match self {
+            Self::ByteStreamSplit => 1,
+            Self::Dictionary | Self::Delta | Self::Plain => 6,
+        })
+    }
+
     /// Layouts worth trying for a column's leaf type.
     fn candidates(data_type: &DataType) -> &'static [Self] {
         match data_type {
             DataType::Float64 => &[Self::Dictionary, Self::ByteStreamSplit, Self::Plain],
-            DataType::Int64 => &[Self::Dictionary, Self::Delta],
+            DataType::Int64 => &[Self::Dictionary, Self::Delta, Self::Plain],
             DataType::List(element) => Self::candidates(element.data_type()),
             DataType::Boolean => &[Self::Plain],
             _ => &[Self::Dictionary],
@@ -72,7 +86,7 @@ fn properties(
     schema: &SchemaRef,
     layout: Layout,
     pairs: &[(String, String)],
-) -> WriterProperties {
+) -> Result<WriterProperties, ParquetError> {
     let key_values = pairs.iter().map(|(key, value)| KeyValue::new(key.clone(), value.clone())).collect();
     // Key columns are leaves of their own, so the index of a field is the index of its leaf.
     let sorting = table
@@ -84,7 +98,7 @@ fn properties(
         .collect();
     let mut properties = WriterProperties::builder()
         .set_created_by(format!("open-structure {}", env!("CARGO_PKG_VERSION")))
-        .set_compression(Compression::ZSTD(ZstdLevel::default()))
+        .set_compression(Compression::ZSTD(layout.level()?))
         .set_statistics_enabled(EnabledStatistics::Page)
         .set_data_page_row_count_limit(PAGE_ROWS)
         .set_dictionary_page_size_limit(DICTIONARY_BYTES)
@@ -105,7 +119,7 @@ fn properties(
     }
     let mut properties = properties.build();
     add_encoded_arrow_schema_to_metadata(schema, &mut properties);
-    properties
+    Ok(properties)
 }
 
 /// Makes column writers of one layout.
@@ -118,7 +132,7 @@ impl LayoutFactory {
     fn new(table: &TableInfo, schema: &SchemaRef, layout: Layout) -> Result<Self, ParquetError> {
         // A factory takes its properties from a file writer; this one writes nothing.
         let root = ArrowSchemaConverter::new().convert(schema)?.root_schema_ptr();
-        let properties = Arc::new(properties(table, schema, layout, &[]));
+        let properties = Arc::new(properties(table, schema, layout, &[])?);
         let writer: SerializedFileWriter<Sink> = SerializedFileWriter::new(sink(), root, properties)?;
         Ok(Self { factory: ArrowRowGroupWriterFactory::new(&writer, Arc::clone(schema)), layout })
     }
@@ -141,6 +155,15 @@ pub(super) struct ParquetTableWriter {
     pending: Vec<RecordBatch>,
     pending_rows: usize,
     row_groups: usize,
+    /// The layout of each column, and the bytes a row that it took when it was chosen.
+    chosen: Vec<Choice>,
+}
+
+/// How a column is laid out until the layouts are compared again.
+#[derive(Clone, Copy, Debug)]
+struct Choice {
+    layout: Layout,
+    bytes_per_row: f64,
 }
 
 impl ParquetTableWriter {
@@ -150,7 +173,7 @@ impl ParquetTableWriter {
         let schema = arrow_schema(table);
         let make = || -> Result<_, ParquetError> {
             let root = ArrowSchemaConverter::new().convert(&schema)?.root_schema_ptr();
-            let properties = Arc::new(properties(table, &schema, Layout::Dictionary, pairs));
+            let properties = Arc::new(properties(table, &schema, Layout::Dictionary, pairs)?);
             let writer = SerializedFileWriter::new(BufWriter::new(file), root, properties)?;
             let factories = Layout::ALL
                 .iter()
@@ -167,6 +190,7 @@ impl ParquetTableWriter {
             pending: Vec::new(),
             pending_rows: 0,
             row_groups: 0,
+            chosen: Vec::new(),
         })
     }
 
@@ -195,11 +219,17 @@ impl ParquetTableWriter {
         let write = || -> Result<(), ParquetError> {
             let batch = concat_batches(&self.schema, &batches)?;
             drop(batches);
-            // Every column in every layout worth trying, on all cores; which one wins depends on sizes alone.
-            let chunks: Vec<ArrowColumnChunk> = (0..batch.num_columns())
+            // Columns side by side on all cores; which layout wins depends on sizes alone.
+            let compare = self.row_groups.is_multiple_of(COMPARE_EVERY);
+            let columns: Vec<(ArrowColumnChunk, Choice)> = (0..batch.num_columns())
                 .into_par_iter()
-                .map(|column| smallest(&self.factories, self.row_groups, &batch, column))
+                .map(|column| {
+                    let before = self.chosen.get(column).filter(|_| !compare).copied();
+                    encode(&self.factories, self.row_groups, &batch, column, before)
+                })
                 .collect::<Result<_, _>>()?;
+            let (chunks, chosen): (Vec<_>, Vec<_>) = columns.into_iter().unzip();
+            self.chosen = chosen;
             let mut row_group = self.writer.next_row_group()?;
             for chunk in chunks {
                 chunk.append_to_row_group(&mut row_group)?;
@@ -223,28 +253,46 @@ impl ParquetTableWriter {
     }
 }
 
-/// The column chunk in the layout that takes the fewest bytes; the first candidate wins a tie.
-fn smallest(
+/// The column chunk in the layout chosen before, or, when there is none or it has become much worse, in
+/// the one that takes the fewest bytes; the first candidate wins a tie.
+fn encode(
     factories: &[LayoutFactory],
     row_group: usize,
     batch: &RecordBatch,
     column: usize,
-) -> Result<ArrowColumnChunk, ParquetError> {
+    before: Option<Choice>,
+) -> Result<(ArrowColumnChunk, Choice), ParquetError> {
     let schema = batch.schema();
     let field = schema.field(column);
     let leaves = compute_leaves(field, batch.column(column))?;
-    let mut best: Option<ArrowColumnChunk> = None;
-    for factory in
-        factories.iter().filter(|factory| Layout::candidates(field.data_type()).contains(&factory.layout))
-    {
+    let with = |factory: &LayoutFactory| -> Result<(ArrowColumnChunk, Choice), ParquetError> {
         let mut writer = factory.column_writer(row_group, column)?;
         for leaf in &leaves {
             writer.write(leaf)?;
         }
         let chunk = writer.close()?;
-        let bytes = |chunk: &ArrowColumnChunk| chunk.close().bytes_written;
-        if best.as_ref().is_none_or(|best| bytes(&chunk) < bytes(best)) {
-            best = Some(chunk);
+        let bytes_per_row = chunk.close().bytes_written as f64 / batch.num_rows() as f64;
+        Ok((chunk, Choice { layout: factory.layout, bytes_per_row }))
+    };
+    let mut best: Option<(ArrowColumnChunk, Choice)> = None;
+    if let Some(before) = before {
+        for factory in factories.iter().filter(|factory| factory.layout == before.layout) {
+            let (chunk, found) = with(factory)?;
+            if found.bytes_per_row <= before.bytes_per_row * TOLERATED_GROWTH {
+                return Ok((chunk, before));
+            }
+            best = Some((chunk, found));
+        }
+    }
+    for factory in
+        factories.iter().filter(|factory| Layout::candidates(field.data_type()).contains(&factory.layout))
+    {
+        if best.as_ref().is_some_and(|(_, best)| best.layout == factory.layout) {
+            continue;
+        }
+        let (chunk, found) = with(factory)?;
+        if best.as_ref().is_none_or(|(_, best)| found.bytes_per_row < best.bytes_per_row) {
+            best = Some((chunk, found));
         }
     }
     best.ok_or_else(|| ParquetError::General(format!("no layout for column {}", field.name())))

@@ -212,9 +212,15 @@ impl SequenceReader {
     /// [`Error::MissingColumn`], [`Error::ColumnType`], [`Error::Null`], [`Error::Container`];
     /// [`Error::TooLarge`] when the rows do not fit into memory.
     pub fn table<R: Record>(&self) -> Result<Vec<R>, Error> {
-        let mut rows = Vec::new();
-        for batch in self.batches::<R>()? {
-            rows.append(&mut batch?);
+        // What a footer claims may be false, so room is made for what is plausible.
+        let claimed = match &self.backend {
+            Backend::Mcap(_) => None,
+            Backend::Parquet(tables) => tables.get(R::TABLE.name).map(ParquetTableReader::plausible_rows),
+        };
+        let mut rows = Vec::with_capacity(claimed.unwrap_or(0));
+        let mut batches = self.batches::<R>()?;
+        while let Some(batch) = batches.next_into(&mut rows) {
+            batch?;
             if rows.len() as u64 > MAX_ROWS_IN_MEMORY {
                 return Err(Error::TooLarge {
                     path: self.path.clone(),
@@ -287,7 +293,7 @@ impl SequenceReader {
                 let stamp = u64::try_from(bundle.frame.stamp_nanos).unwrap_or(0);
                 let mut ready = BTreeMap::new();
                 for message in reader.messages(frame_topics(), Some((stamp, stamp)))? {
-                    take_into(reader, &message?, &mut ready)?;
+                    take_into(reader, message?, &mut ready)?;
                 }
                 if let Some(rows) = ready.remove(&frame_id) {
                     bundle = FrameBundle { frame: bundle.frame, ..rows };
@@ -469,33 +475,44 @@ impl<R> Batches<'_, R> {
     }
 }
 
-impl<R: Record> Iterator for Batches<'_, R> {
-    type Item = Result<Vec<R>, Error>;
-
-    fn next(&mut self) -> Option<Self::Item> {
+impl<R: Record> Batches<'_, R> {
+    /// Appends the next batch to rows; `None` at the end.
+    fn next_into(&mut self, rows: &mut Vec<R>) -> Option<Result<(), Error>> {
+        let before = rows.len();
         let result = match &mut self.source {
             BatchSource::Empty => None,
-            BatchSource::Parquet(batches) => batches.next_rows(),
+            BatchSource::Parquet(batches) => batches.next_into(rows),
             BatchSource::Mcap(reader, messages) => loop {
-                match messages.next()? {
+                let message = match messages.next()? {
+                    Ok(message) => message,
                     Err(error) => break Some(Err(error)),
-                    Ok(message) => match reader.rows::<R>(&message, self.row) {
-                        Ok(None) => {}
-                        Ok(Some(rows)) => {
-                            self.log_time = Some(message.log_time);
-                            break Some(Ok(rows));
-                        }
-                        Err(error) => break Some(Err(error)),
-                    },
+                };
+                let log_time = message.log_time;
+                match reader.rows_into(message, self.row, rows) {
+                    Ok(false) => {}
+                    Ok(true) => {
+                        self.log_time = Some(log_time);
+                        break Some(Ok(()));
+                    }
+                    Err(error) => break Some(Err(error)),
                 }
             },
         };
         match &result {
-            Some(Ok(rows)) => self.row += rows.len() as u64,
+            Some(Ok(())) => self.row += (rows.len() - before) as u64,
             Some(Err(_)) => self.source = BatchSource::Empty,
             None => {}
         }
         result
+    }
+}
+
+impl<R: Record> Iterator for Batches<'_, R> {
+    type Item = Result<Vec<R>, Error>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let mut rows = Vec::new();
+        Some(self.next_into(&mut rows)?.map(|()| rows))
     }
 }
 
@@ -586,7 +603,7 @@ impl Frames<'_> {
                         *ahead = Some(message);
                         break;
                     }
-                    take_into(reader, &message, ready)?;
+                    take_into(reader, message, ready)?;
                 }
                 let mut bundle = ready.remove(&frame.frame_id).unwrap_or_default();
                 bundle.frame = frame.clone();
@@ -601,19 +618,37 @@ impl Frames<'_> {
 /// Puts the rows of a per-frame message among those that wait for their frame.
 fn take_into(
     reader: &McapReader,
-    message: &Message,
+    message: Message,
     ready: &mut BTreeMap<FrameId, FrameBundle>,
 ) -> Result<(), Error> {
     macro_rules! each {
         ($($name:ident: $row:ident,)+) => {
-            $(
-                if let Some(rows) = reader.rows::<$row>(message, 0)? {
-                    for row in rows {
-                        ready.entry(row.frame_id).or_default().$name.push(row);
+            match reader.table_of(&message) {
+                $(
+                    Some(stringify!($name)) => {
+                        let mut rows: Vec<$row> = Vec::new();
+                        reader.rows_into(message, 0, &mut rows)?;
+                        match rows.first().map(|row| row.frame_id) {
+                            None => {}
+                            // As it should be: the rows of one frame, which has none yet.
+                            Some(frame_id) if rows.iter().all(|row| row.frame_id == frame_id) => {
+                                let waiting = &mut ready.entry(frame_id).or_default().$name;
+                                if waiting.is_empty() {
+                                    *waiting = rows;
+                                } else {
+                                    waiting.append(&mut rows);
+                                }
+                            }
+                            Some(_) => {
+                                for row in rows {
+                                    ready.entry(row.frame_id).or_default().$name.push(row);
+                                }
+                            }
+                        }
                     }
-                    return Ok(());
-                }
-            )+
+                )+
+                _ => {}
+            }
         };
     }
     for_each_frame_table!(each);

@@ -21,11 +21,11 @@ pub trait Record:
     /// Hands the columns of some rows to a sink, in field order.
     fn put<S: ColumnSink>(rows: &[Self], sink: &mut S);
 
-    /// Makes rows from columns.
+    /// Makes rows from columns and appends them to others.
     ///
     /// # Errors
-    /// Those of the source.
-    fn take<S: ColumnSource>(source: &S) -> Result<Vec<Self>, S::Error>;
+    /// Those of the source; nothing is appended then.
+    fn take<S: ColumnSource>(source: &S, rows: &mut Vec<Self>) -> Result<(), S::Error>;
 
     /// Compares the keys of two rows: the order in which a table is stored.
     fn compare_key(&self, other: &Self) -> Ordering;
@@ -100,16 +100,16 @@ macro_rules! record {
                 $(<$type as crate::structure::ColumnValue>::put(sink, rows.iter().map(|row| &row.$field));)+
             }
 
-            fn take<S: crate::structure::ColumnSource>(source: &S) -> Result<Vec<Self>, S::Error> {
+            fn take<S: crate::structure::ColumnSource>(source: &S, rows: &mut Vec<Self>) -> Result<(), S::Error> {
                 let mut field = 0;
                 $(
                     let $field = <$type as crate::structure::ColumnValue>::view(source, field)?;
                     field += 1;
                 )+
                 let _ = field;
-                Ok((0..source.len())
-                    .map(|row| Self { $($field: <$type as crate::structure::ColumnValue>::get($field, row)),+ })
-                    .collect())
+                rows.extend((0..source.len())
+                    .map(|row| Self { $($field: <$type as crate::structure::ColumnValue>::get($field, row)),+ }));
+                Ok(())
             }
 
             fn compare_key(&self, other: &Self) -> std::cmp::Ordering {

@@ -1,0 +1,39 @@
+//! The figures that the project promises, each a ratio or a bound, measured in one run.
+//!
+//! `cargo bench --bench figures` measures all, `cargo bench --bench figures -- size` those of one module.
+//! Ends with exit code 1 when a bound does not hold.
+
+#![expect(clippy::print_stdout, clippy::print_stderr, reason = "a program that prints a table")]
+
+#[path = "../data/mod.rs"]
+mod data;
+mod figure;
+mod reading;
+mod scale;
+mod size;
+
+use std::process::ExitCode;
+
+use anyhow::Result;
+use figure::Figures;
+
+type Measure = fn(&mut Figures) -> Result<()>;
+
+fn main() -> Result<ExitCode> {
+    if scale::is_child() {
+        scale::write_as_child()?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let wanted: Vec<String> =
+        std::env::args().skip(1).filter(|argument| !argument.starts_with('-')).collect();
+    let all: [(&str, Measure); 3] =
+        [("reading", reading::measure), ("size", size::measure), ("scale", scale::measure)];
+    let mut figures = Figures::default();
+    for (name, measure) in all {
+        if wanted.is_empty() || wanted.iter().any(|word| name.contains(word.as_str())) {
+            measure(&mut figures)?;
+        }
+    }
+    print!("{figures}");
+    Ok(if figures.hold() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}

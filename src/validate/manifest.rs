@@ -25,6 +25,8 @@ pub(crate) struct Known {
     /// Cameras ready for projection, in the same order; `None` for one whose numbers cannot be used.
     pub(crate) views: Vec<Option<View>>,
     pub(crate) noise: Option<Noise>,
+    /// Whether it certainly says nothing about noise.
+    pub(crate) silent_on_noise: bool,
     pub(crate) summaries: Option<Vec<TableSummary>>,
 }
 
@@ -55,6 +57,7 @@ pub(crate) fn manifest_value(value: &Value, findings: &mut Findings) -> Known {
         cameras: part(value, "cameras"),
         views: Vec::new(),
         noise: part(value, "noise"),
+        silent_on_noise: value.is_object() && value.get("noise").is_none(),
         // Left out when empty.
         summaries: if value.get("tables").is_none() { Some(Vec::new()) } else { part(value, "tables") },
     };

@@ -68,8 +68,6 @@ impl DepthNoise {
 /// What the manifest says about noise, as far as residuals can show it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Declared {
-    /// Whether anything is declared.
-    pub(crate) any: bool,
     /// Sigma of pixel positions.
     pub(crate) sigma_px: Option<f64>,
     /// Noise of depth. That of `kinect-disparity` is not judged: its disparities are whole numbers.
@@ -92,7 +90,7 @@ impl Declared {
             registry::NOISE_KINECT_DISPARITY => None,
             _ => parameter("sigma_depth_m").map(DepthNoise::Metres),
         };
-        Self { any: true, sigma_px: if none { Some(0.0) } else { parameter("sigma_px") }, depth }
+        Self { sigma_px: if none { Some(0.0) } else { parameter("sigma_px") }, depth }
     }
 
     /// How far outside the image a measurement may lie, pixels.

@@ -142,20 +142,20 @@ pub(crate) fn run(shared: &Shared<'_>, known: &Known, mut findings: Findings) ->
         [&measured_lines, &observed_lines],
         &mut findings,
     );
-    if let Some(known) = world.points {
+    if let Some(landmarks) = world.points {
         judge(
             &POINTS,
-            known.index.ids(),
+            landmarks.index.ids(),
             &mut observed_points,
             &mut measured_points,
             &world.noise,
             &mut findings,
         );
     }
-    if let Some(known) = world.lines {
+    if let Some(landmarks) = world.lines {
         judge(
             &LINES,
-            known.index.ids(),
+            landmarks.index.ids(),
             &mut observed_lines,
             &mut measured_lines,
             &world.noise,
@@ -180,7 +180,7 @@ pub(crate) fn run(shared: &Shared<'_>, known: &Known, mut findings: Findings) ->
         .iter()
         .map(|table| outcomes.get(table).map_or(0, |outcome| outcome.rows))
         .sum::<u64>();
-    if measured > 0 && !world.noise.any {
+    if measured > 0 && known.silent_on_noise {
         findings.add(RuleId::NoiseDeclared, None, || {
             Detail::new(
                 "the noise of the measurements in the manifest",

@@ -20,6 +20,11 @@ enum Command {
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
+    // Without a handler an interrupted program merely leaves a temporary file behind.
+    let _ = ctrlc::set_handler(|| {
+        open_structure::format::discard_unfinished();
+        std::process::exit(130);
+    });
     let mut stdout = io::stdout().lock();
     let mut stderr = io::stderr();
     let result = match &cli.command {

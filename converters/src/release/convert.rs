@@ -13,13 +13,13 @@ use super::poses::{Poses, is_coarse, largest_angle, largest_distance, poses};
 use super::recover::{
     count_unfit, recover_depths, recover_line_landmarks, recover_points, recover_unrefined,
 };
-use super::residual::{DepthMiss, by_line, by_point, line_depths};
+use super::residual::{DepthMiss, by_line, by_point, line_depths, line_distances, line_views};
 use super::rows::{Rows, line_observation, point_observation};
 use crate::family::{Choice, Clues, Sight, choose, sight};
 use crate::text_release::{PoseFile, TextSequence};
 use open_structure::geometry::{PinholeCamera, PluckerLine};
 use open_structure::structure::{
-    CameraId, Frame, FrameId, LineId, LineLandmark, LineMeasurement, PointLandmark, Recovery, Sequence,
+    CameraId, Frame, FrameId, LineId, LineLandmark, PointLandmark, Recovery, Sequence,
     frame_statistics, line_correspondences, point_correspondences, registry,
 };
 use std::collections::{BTreeMap, BTreeSet};
@@ -317,7 +317,8 @@ fn stamp_nanos(FrameId(id): FrameId) -> i64 {
     seconds * 1_000_000_000 + (rest * 1_000_000_000 + RATE_HZ / 2) / RATE_HZ
 }
 
-/// The depths of measured line ends against the best lines at hand: fitted to noise-free rows, published, fitted to their own rows.
+/// The depths of measured line ends against the best lines at hand: fitted to noise-free rows; published, where the rows lie on
+/// them; fitted to the noisy rows themselves.
 fn depth_misses(
     measured: &Judged,
     association: &Judged,
@@ -329,12 +330,18 @@ fn depth_misses(
     let fitted = |judged: &Judged, id: &LineId| Some(judged.fits.get(id)?.as_ref().ok()?.line);
     by_line(&measured.rows.lines)
         .iter()
-        .filter_map(|(id, track): (&LineId, &Vec<&LineMeasurement>)| {
-            let line = exact
-                .then(|| fitted(association, id))
-                .flatten()
-                .or_else(|| published.get(id).copied())
-                .or_else(|| fitted(measured, id))?;
+        .filter_map(|(id, track)| {
+            let of_exact = exact.then(|| fitted(association, id)).flatten();
+            let line = of_exact.or_else(|| match (published.get(id).copied(), fitted(measured, id)) {
+                // Published lines may have been turned, or be wrong.
+                (Some(published), Some(own)) => {
+                    let views = line_views(track, truth, camera);
+                    let squares =
+                        |line: &PluckerLine| line_distances(&views, line).iter().map(|d| d * d).sum::<f64>();
+                    Some(if squares(&published) < 1.2 * squares(&own) { published } else { own })
+                }
+                (published, own) => published.or(own),
+            })?;
             Some(line_depths(track, truth, camera, &line))
         })
         .flatten()

@@ -53,7 +53,9 @@ fn child() {
 fn size_of(path: &Path) -> u64 {
     match fs::metadata(path) {
         Ok(found) if found.is_dir() => fs::read_dir(path)
-            .map(|entries| entries.flatten().map(|entry| entry.metadata().map_or(0, |found| found.len())).sum())
+            .map(|entries| {
+                entries.flatten().map(|entry| entry.metadata().map_or(0, |found| found.len())).sum()
+            })
             .unwrap_or(0),
         Ok(found) => found.len(),
         Err(_) => 0,

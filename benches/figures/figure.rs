@@ -96,7 +96,11 @@ pub(crate) fn median_time<T>(runs: usize, mut run: impl FnMut() -> T) -> Duratio
 
 /// The median of how many times longer the first takes than the second, run in turn, so that both meet
 /// the same machine.
-pub(crate) fn median_ratio<T, U>(runs: usize, mut first: impl FnMut() -> T, mut second: impl FnMut() -> U) -> f64 {
+pub(crate) fn median_ratio<T, U>(
+    runs: usize,
+    mut first: impl FnMut() -> T,
+    mut second: impl FnMut() -> U,
+) -> f64 {
     let mut ratios: Vec<f64> = (0..=runs)
         .map(|_| time_of(&mut first).as_secs_f64() / time_of(&mut second).as_secs_f64())
         .skip(1)

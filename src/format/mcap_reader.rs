@@ -22,8 +22,10 @@ use crate::structure::{Manifest, Record, TableSummary, table_info};
 
 /// Largest chunk that is decompressed; writers keep to a few MiB.
 const MAX_CHUNK_BYTES: u64 = 1 << 29;
-/// Largest plausible ratio of a chunk's sizes; zstd reaches a few thousand on constant data.
-const MAX_CHUNK_RATIO: u64 = 1 << 16;
+/// Largest plausible ratio of all chunks together, uncompressed, to the file.
+const MAX_RATIO: u64 = 512;
+/// Uncompressed size that any file may have, however well it compresses.
+const ALWAYS_PERMITTED_BYTES: u64 = 1 << 26;
 
 /// A table's channel.
 #[derive(Clone, Debug)]
@@ -46,18 +48,7 @@ impl McapReader {
         let file = CountedFile::open(path, bytes_read)?;
         let summary = guarded(path, "MCAP", || read_summary(&file))?;
         let failed = |detail: String| Error::Container { path: path.to_owned(), container: "MCAP", detail };
-        for chunk in &summary.chunk_indexes {
-            let limit = chunk.compressed_size.saturating_mul(MAX_CHUNK_RATIO).min(MAX_CHUNK_BYTES);
-            if chunk.uncompressed_size > limit {
-                let what = format!("a chunk's uncompressed size (at byte {})", chunk.chunk_start_offset);
-                return Err(Error::TooLarge {
-                    path: path.to_owned(),
-                    what,
-                    found: chunk.uncompressed_size,
-                    limit,
-                });
-            }
-        }
+        check_chunks(path, &summary, file.length())?;
         let mut channels: BTreeMap<&'static str, Vec<TableChannel>> = BTreeMap::new();
         let (mut stored, mut passed_over) = (Vec::new(), Vec::new());
         let mut listed: Vec<_> = summary.channels.values().collect();
@@ -324,6 +315,30 @@ impl Iterator for Messages {
         }
         result
     }
+}
+
+/// Refuses an index whose chunks would not fit into the file, or would take much more memory than files do.
+fn check_chunks(path: &Path, summary: &Summary, length: u64) -> Result<(), Error> {
+    let too_large =
+        |what: String, found, limit| Err(Error::TooLarge { path: path.to_owned(), what, found, limit });
+    let (mut compressed, mut uncompressed) = (0_u64, 0_u64);
+    for chunk in &summary.chunk_indexes {
+        if chunk.uncompressed_size > MAX_CHUNK_BYTES {
+            let what = format!("a chunk's uncompressed size (at byte {})", chunk.chunk_start_offset);
+            return too_large(what, chunk.uncompressed_size, MAX_CHUNK_BYTES);
+        }
+        compressed = compressed.saturating_add(chunk.compressed_size);
+        uncompressed = uncompressed.saturating_add(chunk.uncompressed_size);
+    }
+    if compressed > length {
+        // Chunks that overlap would be read, and their rows taken, again and again.
+        return too_large("size of all chunks".to_owned(), compressed, length);
+    }
+    let limit = length.saturating_mul(MAX_RATIO).saturating_add(ALWAYS_PERMITTED_BYTES);
+    if uncompressed > limit {
+        return too_large("uncompressed size of all chunks".to_owned(), uncompressed, limit);
+    }
+    Ok(())
 }
 
 fn read_summary(file: &CountedFile) -> Result<Summary, Error> {

@@ -18,12 +18,21 @@ use super::arrow_batch::from_batch;
 use super::counted_file::CountedFile;
 use super::guard::guarded;
 use super::stored_table::StoredTable;
-use crate::structure::{FrameId, Record, TableInfo};
+use crate::structure::{ColumnType, FrameId, Record, TableInfo};
 
 /// Rows decoded at once: columns of a batch stay in the cache.
 const BATCH_ROWS: usize = 1 << 13;
-/// Largest plausible number of rows per byte of file; constant columns reach a few hundred.
-const MAX_ROWS_PER_BYTE: u64 = 1 << 12;
+/// The same for tables with texts, bytes or lists, whose length only decoding tells.
+const BATCH_ROWS_OF_ANY_LENGTH: usize = 1 << 10;
+/// Largest plausible number of rows per byte of file: keys differ from row to row, so even constant
+/// columns stay below a hundred.
+const MAX_ROWS_PER_BYTE: u64 = 256;
+/// Rows that any file may have, however few bytes they take.
+const ALWAYS_PERMITTED_ROWS: u64 = 1 << 20;
+/// Largest plausible ratio of decoded columns to the file.
+const MAX_RATIO: u64 = 512;
+/// Size that decoded columns may have, however few bytes they take.
+const ALWAYS_PERMITTED_BYTES: u64 = 1 << 28;
 
 /// A table's file, its footer read.
 pub(super) struct ParquetTableReader {
@@ -47,13 +56,8 @@ impl ParquetTableReader {
             ArrowReaderMetadata::load(&file, options)
                 .map_err(|error| Error::container(path, "Parquet")(error.into()))
         })?;
-        let rows = metadata.metadata().file_metadata().num_rows();
-        let rows = u64::try_from(rows).map_err(|_| Error::Container {
-            path: path.to_owned(),
-            container: "Parquet",
-            detail: format!("{rows} rows"),
-        })?;
-        let limit = file.length().saturating_mul(MAX_ROWS_PER_BYTE);
+        let rows = claimed_rows(path, metadata.metadata())?;
+        let limit = file.length().saturating_mul(MAX_ROWS_PER_BYTE).saturating_add(ALWAYS_PERMITTED_ROWS);
         if rows > limit {
             return Err(Error::TooLarge {
                 path: path.to_owned(),
@@ -103,7 +107,7 @@ impl ParquetTableReader {
             })
             .collect();
         if groups.is_empty() {
-            return Ok(ParquetBatches { file: self.file.clone(), reader: None, row: 0 });
+            return Ok(ParquetBatches { file: self.file.clone(), reader: None, row: 0, decoded: 0 });
         }
         guarded(path, "Parquet", || {
             let options = ArrowReaderOptions::new()
@@ -142,14 +146,39 @@ impl ParquetTableReader {
             let mask = ProjectionMask::roots(metadata.parquet_schema(), known);
             let mut builder =
                 ParquetRecordBatchReaderBuilder::new_with_metadata(self.file.clone(), metadata.clone())
-                    .with_batch_size(BATCH_ROWS)
+                    .with_batch_size(batch_rows(R::TABLE))
                     .with_projection(mask);
             if let Some((groups, selection)) = part {
                 builder = builder.with_row_groups(groups).with_row_selection(RowSelection::from(selection));
             }
             let reader = builder.build().map_err(|error| Error::container(path, "Parquet")(error.into()))?;
-            Ok(ParquetBatches { file: self.file.clone(), reader: Some(reader), row: 0 })
+            Ok(ParquetBatches { file: self.file.clone(), reader: Some(reader), row: 0, decoded: 0 })
         })
+    }
+}
+
+fn batch_rows(table: &TableInfo) -> usize {
+    let fixed = |kind| matches!(kind, ColumnType::Int64 | ColumnType::Float64 | ColumnType::Boolean);
+    if table.fields.iter().all(|field| fixed(field.kind)) { BATCH_ROWS } else { BATCH_ROWS_OF_ANY_LENGTH }
+}
+
+/// Rows of the file as its footer and its row groups say, which have to agree.
+fn claimed_rows(path: &Path, footer: &ParquetMetaData) -> Result<u64, Error> {
+    let whole = footer.file_metadata().num_rows();
+    let groups = footer.row_groups().iter().try_fold(0_i64, |sum, group| {
+        let rows = group.num_rows();
+        if rows < 0 { None } else { sum.checked_add(rows) }
+    });
+    match u64::try_from(whole) {
+        Ok(rows) if groups == Some(whole) => Ok(rows),
+        _ => Err(Error::Container {
+            path: path.to_owned(),
+            container: "Parquet",
+            detail: match groups {
+                Some(groups) => format!("{whole} rows, but {groups} in its row groups"),
+                None => format!("{whole} rows, but a row group of less than none or more than can be"),
+            },
+        }),
     }
 }
 
@@ -184,6 +213,8 @@ pub(super) struct ParquetBatches {
     file: CountedFile,
     reader: Option<ParquetRecordBatchReader>,
     row: u64,
+    /// Bytes of the columns decoded so far.
+    decoded: u64,
 }
 
 impl ParquetBatches {
@@ -195,12 +226,23 @@ impl ParquetBatches {
 
     /// Appends the next rows; `None` at the end.
     pub(super) fn next_into<R: Record>(&mut self, rows: &mut Vec<R>) -> Option<Result<(), Error>> {
-        let Self { file, reader, row } = self;
+        let Self { file, reader, row, decoded } = self;
         let path = file.path();
+        let limit = file.length().saturating_mul(MAX_RATIO).saturating_add(ALWAYS_PERMITTED_BYTES);
         let result = guarded(path, "Parquet", || match reader.as_mut().and_then(Iterator::next) {
             None => Ok(None),
             Some(batch) => {
                 let batch = batch.map_err(|error| Error::container(path, "Parquet")(error.into()))?;
+                *decoded = decoded.saturating_add(batch.get_array_memory_size() as u64);
+                if *decoded > limit {
+                    // A few bytes of dictionary and of run lengths can stand for any number of long values.
+                    return Err(Error::TooLarge {
+                        path: path.to_owned(),
+                        what: "decoded size of the columns".to_owned(),
+                        found: *decoded,
+                        limit,
+                    });
+                }
                 from_batch(&batch, *row, rows)?;
                 *row += batch.num_rows() as u64;
                 Ok(Some(()))

@@ -6,14 +6,14 @@ use open_structure::structure::*;
 use proptest::prelude::*;
 
 /// Draws values, odd ones as often as usual ones: splitmix64.
-pub struct Random(u64);
+pub(crate) struct Random(u64);
 
 impl Random {
-    pub const fn new(seed: u64) -> Self {
+    pub(crate) const fn new(seed: u64) -> Self {
         Self(seed)
     }
 
-    pub const fn next(&mut self) -> u64 {
+    pub(crate) const fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut bits = self.0;
         bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -29,7 +29,7 @@ impl Random {
         self.next() % end
     }
 
-    pub fn float(&mut self) -> f64 {
+    pub(crate) fn float(&mut self) -> f64 {
         const ODD: &[f64] = &[
             0.0,
             -0.0,
@@ -197,11 +197,11 @@ fn sequence(seed: u64, rows: &[usize]) -> Sequence {
         };
     }
     macro_rules! per_frame {
-        ($($name:ident),+) => {
+        ($($name:ident: $row:ident),+) => {
             $(
                 let rows = sizes.next().unwrap_or(0);
                 if !frames.is_empty() {
-                    sequence.$name = table(rows, &mut random, |row, random| row.frame_id = random.pick(&frames));
+                    sequence.$name = table(rows, &mut random, |row: &mut $row, random| row.frame_id = random.pick(&frames));
                 }
             )+
         };
@@ -221,7 +221,12 @@ fn sequence(seed: u64, rows: &[usize]) -> Sequence {
         graph_factors,
         frame_statistics
     );
-    per_frame!(point_observations, line_observations, point_measurements, line_measurements);
+    per_frame!(
+        point_observations: PointObservation,
+        line_observations: LineObservation,
+        point_measurements: PointMeasurement,
+        line_measurements: LineMeasurement
+    );
     sequence.manifest.name = random.text();
     sequence.manifest.description = Some(random.text());
     sequence.manifest.clock.rate_hz = Some(random.float()).filter(|rate| rate.is_finite());
@@ -229,13 +234,13 @@ fn sequence(seed: u64, rows: &[usize]) -> Sequence {
 }
 
 /// Any sequence; shrinks by leaving out rows, table by table.
-pub fn sequences() -> impl Strategy<Value = Sequence> {
+pub(crate) fn sequences() -> impl Strategy<Value = Sequence> {
     (any::<u64>(), proptest::collection::vec(0_usize..40, TABLES.len()))
         .prop_map(|(seed, rows)| sequence(seed, &rows))
 }
 
 /// The canonical bytes of every row of every table: equal where every bit is, `NaN` and `-0.0` included.
-pub fn bytes_of(sequence: &Sequence) -> Vec<(&'static str, Vec<Vec<u8>>)> {
+pub(crate) fn bytes_of(sequence: &Sequence) -> Vec<(&'static str, Vec<Vec<u8>>)> {
     fn rows<R: Record>(sequence: &Sequence) -> (&'static str, Vec<Vec<u8>>) {
         let bytes = |row: &R| {
             let mut bytes = Vec::new();

@@ -18,10 +18,12 @@ use super::arrow_batch::from_batch;
 use super::counted_file::CountedFile;
 use super::guard::guarded;
 use super::stored_table::StoredTable;
-use crate::structure::{FrameId, Record, TableInfo};
+use crate::structure::{ColumnType, FrameId, Record, TableInfo};
 
 /// Rows decoded at once: columns of a batch stay in the cache.
 const BATCH_ROWS: usize = 1 << 13;
+/// The same for tables with texts, bytes or lists, whose length only decoding tells.
+const BATCH_ROWS_OF_ANY_LENGTH: usize = 1 << 10;
 /// Largest plausible number of rows per byte of file: keys differ from row to row, so even constant
 /// columns stay below a hundred.
 const MAX_ROWS_PER_BYTE: u64 = 256;
@@ -144,7 +146,7 @@ impl ParquetTableReader {
             let mask = ProjectionMask::roots(metadata.parquet_schema(), known);
             let mut builder =
                 ParquetRecordBatchReaderBuilder::new_with_metadata(self.file.clone(), metadata.clone())
-                    .with_batch_size(BATCH_ROWS)
+                    .with_batch_size(batch_rows(R::TABLE))
                     .with_projection(mask);
             if let Some((groups, selection)) = part {
                 builder = builder.with_row_groups(groups).with_row_selection(RowSelection::from(selection));
@@ -153,6 +155,11 @@ impl ParquetTableReader {
             Ok(ParquetBatches { file: self.file.clone(), reader: Some(reader), row: 0, decoded: 0 })
         })
     }
+}
+
+fn batch_rows(table: &TableInfo) -> usize {
+    let fixed = |kind| matches!(kind, ColumnType::Int64 | ColumnType::Float64 | ColumnType::Boolean);
+    if table.fields.iter().all(|field| fixed(field.kind)) { BATCH_ROWS } else { BATCH_ROWS_OF_ANY_LENGTH }
 }
 
 /// Rows of the file as its footer and its row groups say, which have to agree.

@@ -2,11 +2,13 @@
 
 mod sample;
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 use open_structure::format::{self, Error};
+use open_structure::structure::MapPoint;
 use sample::{Parts, folder_parts, mcap_bytes};
 
 /// No file here is larger than 100 kB, so this much memory is never honestly needed.
@@ -20,7 +22,7 @@ struct Tally {
     read: usize,
     refused: usize,
     /// Panics of a decoder that the wall around it turned into errors.
-    decoder_panics: usize,
+    decoder_panics: BTreeSet<String>,
     slowest: Duration,
 }
 
@@ -32,7 +34,9 @@ impl Tally {
             Ok(()) => self.read += 1,
             Err(error) => {
                 self.refused += 1;
-                self.decoder_panics += usize::from(matches!(error, Error::Decoder { .. }));
+                if let Error::Decoder { detail, .. } = &error {
+                    self.decoder_panics.insert(detail.clone());
+                }
                 assert!(!error.to_string().is_empty());
             }
         }
@@ -109,7 +113,7 @@ fn bits_of_an_mcap_file_flip() {
         fs::write(&path, &bytes).unwrap();
         tally.read(&path);
     }
-    assert!(tally.refused > 0);
+    assert_eq!(tally.read, 0, "a checksum covers every byte");
     tally.tell("flipped bits in MCAP");
 }
 
@@ -168,7 +172,7 @@ fn an_mcap_chunk_of_zeros_stays_within_bounds() {
         let channel = writer.add_channel(schema, topic, "arrow", &std::collections::BTreeMap::new()).unwrap();
         let header =
             mcap::records::MessageHeader { channel_id: channel, sequence: 0, log_time: 0, publish_time: 0 };
-        writer.write_to_known_channel(&header, &vec![0; 200 << 20]).unwrap();
+        writer.write_to_known_channel(&header, &vec![0; 100 << 20]).unwrap();
     }
     writer.finish().unwrap();
     drop(writer);
@@ -255,7 +259,7 @@ fn a_parquet_footer_that_claims_2_to_the_60_rows_is_refused() {
     }
 }
 
-/// A dictionary of one long value, to which run lengths of a few bytes refer a million times.
+/// A dictionary of one long value, to which run lengths of a few bytes refer again and again.
 #[test]
 fn a_parquet_dictionary_bomb_stays_within_bounds() {
     let parts = folder_parts();
@@ -265,7 +269,7 @@ fn a_parquet_dictionary_bomb_stays_within_bounds() {
     assert!(bomb.len() < 200_000, "{} bytes", bomb.len());
     fs::write(folder.path().join("map_points.parquet"), bomb).unwrap();
     let reader = format::open(folder.path()).unwrap();
-    let error = reader.table::<open_structure::structure::MapPoint>().expect_err("so much is refused");
+    let error = reader.table::<MapPoint>().expect_err("so much is refused");
     assert!(matches!(error, Error::TooLarge { .. }), "{error}");
     Tally::default().tell("dictionary bomb");
 }

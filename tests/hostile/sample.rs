@@ -105,9 +105,9 @@ pub(crate) fn with_row_count(whole: &[u8], rows: i64) -> Vec<u8> {
     bytes
 }
 
-/// A table `map_points` of a hundred thousand rows that all name an estimate of 64 kB.
+/// A table `map_points` of twenty thousand rows that all name an estimate of 64 kB.
 pub(crate) fn dictionary_bomb() -> Vec<u8> {
-    const ROWS: usize = 100_000;
+    const ROWS: usize = 20_000;
     let long = "x".repeat(1 << 16);
     let properties = WriterProperties::builder()
         .set_compression(Compression::ZSTD(ZstdLevel::default()))

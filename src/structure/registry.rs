@@ -196,7 +196,7 @@ pub const FAMILIES: &[Family] = &[
             ),
             (
                 PARALLELISM,
-                "vertex `line_id`, group `group_id`; measurement empty; residual: direction of the line × direction of the group; information one number (1/rad²), the same for every component",
+                "vertex `line_id`, group `group_id`; measurement empty; residual: direction of the line × direction of the group; information over the residual, which for small angles is in radians",
             ),
         ],
     },
@@ -261,7 +261,7 @@ pub const FACTOR_SHAPES: &[FactorShape] = &[
         sizes: &[size(4, 4), size(6, 6)],
     },
     FactorShape { kind: RELATIVE_POSE, columns: &["frame_id", "other_frame_id"], sizes: &[size(7, 6)] },
-    FactorShape { kind: PARALLELISM, columns: &["line_id", "group_id"], sizes: &[size(0, 1)] },
+    FactorShape { kind: PARALLELISM, columns: &["line_id", "group_id"], sizes: &[size(0, 3)] },
 ];
 
 /// The shape of a factor of a well-known kind.

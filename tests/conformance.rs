@@ -3,12 +3,14 @@
 #[path = "conformance/builder/mod.rs"]
 mod builder;
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::{Arc, Mutex, Weak};
 
-use builder::{Case, Stored};
+use builder::{Case, Expected, Stored};
 use open_structure::format::{self, WriteOptions};
 use open_structure::structure::{Sequence, TableSummary};
+use open_structure::validate;
 use rayon::prelude::*;
 use tempfile::TempDir;
 
@@ -126,4 +128,78 @@ fn the_corpus_as_files_says_what_to_expect() {
         }
     }
     assert!(builder::export(&output).is_err(), "what is there must not be overwritten");
+}
+
+/// What the validator reports of a file: rule, severity and table, each once.
+type Reported = BTreeSet<(String, String, Option<String>)>;
+
+fn reported(path: &Path) -> Result<Reported, String> {
+    let report =
+        validate::validate(path, &validate::Options::default()).map_err(|error| error.to_string())?;
+    let counted = report.rules.iter().map(|count| {
+        (count.rule.to_owned(), count.severity.name().to_owned(), count.table.map(str::to_owned))
+    });
+    Ok(counted.collect())
+}
+
+/// Holds what is reported against what the case expects.
+fn compare(case: &Case, stored: Stored, found: &Reported) -> Result<(), String> {
+    let expected: Vec<_> = case.findings.iter().filter(|expected| expected.follows_in(stored)).collect();
+    let fits = |expected: &Expected, (rule, severity, table): &(String, String, Option<String>)| {
+        expected.rule == *rule
+            && expected.severity == *severity
+            && (expected.table.is_none() || expected.table == *table)
+    };
+    let missing = expected
+        .iter()
+        .filter(|expected| !expected.optional && !found.iter().any(|found| fits(expected, found)))
+        .map(|expected| format!("{} {} is not reported", expected.rule, text(expected.table.as_deref())));
+    // Another table of an expected rule is no other defect.
+    let surplus = found
+        .iter()
+        .filter(|found| {
+            !expected.iter().any(|expected| expected.rule == found.0 && expected.severity == found.1)
+        })
+        .map(|(rule, _, table)| format!("{rule} {} is reported", text(table.as_deref())));
+    let wrong: Vec<String> = missing.chain(surplus).collect();
+    if wrong.is_empty() { Ok(()) } else { Err(wrong.join("; ")) }
+}
+
+fn text(table: Option<&str>) -> String {
+    table.map_or_else(String::new, |table| format!("({table})"))
+}
+
+#[test]
+fn valid_cases_have_no_findings_but_the_expected_advice() {
+    check_all("valid/", |case, stored, path| compare(case, stored, &reported(path)?));
+}
+
+#[test]
+fn invalid_cases_show_their_defect_and_no_other() {
+    check_all("invalid/", |case, stored, path| compare(case, stored, &reported(path)?));
+}
+
+#[test]
+fn the_folders_are_the_rules() {
+    let corpus = corpus();
+    let folders: BTreeSet<&str> = corpus.cases.iter().filter_map(Case::rule).collect();
+    let rules: BTreeSet<&str> = validate::RULES.iter().map(|rule| rule.id).collect();
+    assert_eq!(folders, rules);
+    for case in &corpus.cases {
+        for expected in &case.findings {
+            let rule = validate::rule(&expected.rule);
+            let severity = rule.map(|rule| rule.severity.name());
+            assert_eq!(severity, Some(expected.severity.as_str()), "{}: {}", case.name, expected.rule);
+            let grave = case.name.starts_with("valid/") && expected.severity != "advice";
+            assert!(!grave, "{}: a valid case has nothing but advice", case.name);
+        }
+        if let Some(rule) = case.rule() {
+            for stored in &case.encodings {
+                let named = case.findings.iter().any(|expected| {
+                    expected.rule == rule && !expected.optional && expected.follows_in(*stored)
+                });
+                assert!(named, "{} ({}) does not expect its own rule", case.name, stored.name());
+            }
+        }
+    }
 }

@@ -71,6 +71,13 @@ pub(crate) struct Case {
     pub(crate) findings: Vec<Expected>,
 }
 
+impl Case {
+    /// The rule that an invalid case is about.
+    pub(crate) fn rule(&self) -> Option<&str> {
+        self.name.strip_prefix("invalid/")?.split('/').next()
+    }
+}
+
 /// The text of a case.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -20,7 +20,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use case::cases;
-pub(crate) use case::{Case, Stored};
+pub(crate) use case::{Case, Expected, Stored};
 use document::Document;
 use edit::Edit;
 pub(crate) use export::export;

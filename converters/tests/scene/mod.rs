@@ -10,17 +10,17 @@ use std::io::Write as _;
 use std::path::Path;
 
 /// Random numbers of a known recurrence: the same on every machine.
-pub struct Draw(u64);
+pub(crate) struct Draw(u64);
 
 impl Draw {
     /// Uniform in (0, 1).
-    pub fn uniform(&mut self) -> f64 {
+    pub(crate) fn uniform(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         ((self.0 >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
     }
 
     /// Normal, by Box and Muller.
-    pub fn normal(&mut self, sigma: f64) -> f64 {
+    pub(crate) fn normal(&mut self, sigma: f64) -> f64 {
         let radius = (-2.0 * self.uniform().ln()).sqrt();
         sigma * radius * (std::f64::consts::TAU * self.uniform()).cos()
     }
@@ -28,38 +28,40 @@ impl Draw {
 
 /// Noise of the rows of a file.
 #[derive(Clone, Copy)]
-pub enum Noise {
+pub(crate) enum Noise {
     None,
     /// 1 px; 0.05 m, of which what exceeds 0.1 m is replaced by 0.08 m.
-    FirstRelease { seed: u64 },
+    FirstRelease {
+        seed: u64,
+    },
 }
 
 /// A line as it was observed, and as it was published: turned about its midpoint.
 #[derive(Clone, Copy)]
-pub struct SceneLine {
-    pub group: i64,
-    pub unrefined: Segment,
-    pub published: Segment,
+pub(crate) struct SceneLine {
+    pub(crate) group: i64,
+    pub(crate) unrefined: Segment,
+    pub(crate) published: Segment,
 }
 
-pub struct Scene {
-    pub camera: PinholeCamera,
+pub(crate) struct Scene {
+    pub(crate) camera: PinholeCamera,
     /// `world_from_camera`; ids have gaps.
-    pub frames: BTreeMap<i64, Pose>,
-    pub points: BTreeMap<i64, Point3<f64>>,
-    pub lines: BTreeMap<i64, SceneLine>,
+    pub(crate) frames: BTreeMap<i64, Pose>,
+    pub(crate) points: BTreeMap<i64, Point3<f64>>,
+    pub(crate) lines: BTreeMap<i64, SceneLine>,
 }
 
 /// Rows `(landmark, frame, numbers)`.
-pub struct SceneRows {
-    pub points: Vec<(i64, i64, [f64; 2])>,
-    pub lines: Vec<(i64, i64, [f64; 6])>,
+pub(crate) struct SceneRows {
+    pub(crate) points: Vec<(i64, i64, [f64; 2])>,
+    pub(crate) lines: Vec<(i64, i64, [f64; 6])>,
 }
 
 /// The text files of both archives, by name.
-pub struct Release {
-    pub observation: BTreeMap<String, String>,
-    pub baseline: BTreeMap<String, String>,
+pub(crate) struct Release {
+    pub(crate) observation: BTreeMap<String, String>,
+    pub(crate) baseline: BTreeMap<String, String>,
 }
 
 /// To the digits that are printed, so that truth and text are the same numbers.
@@ -72,18 +74,19 @@ fn printed_point(point: Point3<f64>) -> Point3<f64> {
 }
 
 impl Scene {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self::with_camera([535.4, 539.2, 320.1, 247.6])
     }
 
-    pub fn with_camera([fx, fy, cx, cy]: [f64; 4]) -> Self {
+    pub(crate) fn with_camera([fx, fy, cx, cy]: [f64; 4]) -> Self {
         let camera = PinholeCamera { fx, fy, cx, cy, width: 640, height: 480 };
         let mut draw = Draw(42);
         let mut between = |low: f64, high: f64| low + (high - low) * draw.uniform();
         let frames = (0..32)
             .map(|index| {
                 let turn = f64::from(index) / 31.0 - 0.5;
-                let translation = Vector3::new(1.6 * turn, 0.4 * (3.0 * turn).sin(), -4.0 + turn).map(printed);
+                let translation =
+                    Vector3::new(1.6 * turn, 0.4 * (3.0 * turn).sin(), -4.0 + turn).map(printed);
                 let rotation = UnitQuaternion::from_euler_angles(0.05 * turn, -0.3 * turn, 0.1 * turn);
                 let components = rotation.coords.map(printed);
                 let pose = Pose::from_components(translation.into(), components.into()).unwrap();
@@ -105,7 +108,8 @@ impl Scene {
                 let half = between(0.25, 0.4);
                 // Two to three degrees, as the release's lines were turned.
                 let axis = direction.cross(&Vector3::new(between(-1.0, 1.0), 0.3, between(0.5, 1.0)));
-                let turned = UnitQuaternion::from_scaled_axis(axis.normalize() * between(0.035, 0.05)) * direction;
+                let turned =
+                    UnitQuaternion::from_scaled_axis(axis.normalize() * between(0.035, 0.05)) * direction;
                 let sign = if id % 2 == 0 { 1.0 } else { -1.0 };
                 let segment = |along: Vector3<f64>| Segment {
                     start: printed_point(midpoint - along * half * sign),
@@ -117,14 +121,15 @@ impl Scene {
         Self { camera, frames, points, lines }
     }
 
-    pub fn depth_of_point(&self, frame: i64, point: i64) -> f64 {
+    pub(crate) fn depth_of_point(&self, frame: i64, point: i64) -> f64 {
         (self.frames[&frame].inverse() * self.points[&point]).z
     }
 
     /// What every frame sees, without noise; ends in alternating order.
-    pub fn rows(&self) -> SceneRows {
+    pub(crate) fn rows(&self) -> SceneRows {
         let mut rows = SceneRows { points: Vec::new(), lines: Vec::new() };
-        let inside = |pixel: &Point2<f64>| (0.0..=640.0).contains(&pixel.x) && (0.0..=480.0).contains(&pixel.y);
+        let inside =
+            |pixel: &Point2<f64>| (0.0..=640.0).contains(&pixel.x) && (0.0..=480.0).contains(&pixel.y);
         for (frame, pose) in &self.frames {
             let camera_from_world = pose.inverse();
             let see = |point: Point3<f64>| {
@@ -152,7 +157,7 @@ impl Scene {
             Noise::None => 0,
             Noise::FirstRelease { seed } => seed,
         });
-        let mut pixel = |value: f64, draw: &mut Draw| match noise {
+        let pixel = |value: f64, draw: &mut Draw| match noise {
             Noise::None => value,
             Noise::FirstRelease { .. } => value + draw.normal(1.0),
         };
@@ -177,14 +182,18 @@ impl Scene {
             text.push_str(" \n");
         }
         for group in 0..2 {
-            let ids: Vec<String> =
-                self.lines.iter().filter(|(_, line)| line.group == group).map(|(id, _)| id.to_string()).collect();
+            let ids: Vec<String> = self
+                .lines
+                .iter()
+                .filter(|(_, line)| line.group == group)
+                .map(|(id, _)| id.to_string())
+                .collect();
             writeln!(text, "ParalineMaplineAsso: {group} {} {}", ids.len(), ids.join("  ")).unwrap();
         }
         text
     }
 
-    pub fn release(&self, association: Noise, graph: Noise) -> Release {
+    pub(crate) fn release(&self, association: Noise, graph: Noise) -> Release {
         let mut draw = Draw(99);
         let mut poses = String::new();
         let mut drifted = String::new();
@@ -201,11 +210,18 @@ impl Scene {
             .iter()
             .map(|(id, line)| {
                 let Segment { start, end } = line.published;
-                format!("{id} {:.6} {:.6} {:.6} {:.6} {:.6} {:.6}\n", start.x, start.y, start.z, end.x, end.y, end.z)
+                format!(
+                    "{id} {:.6} {:.6} {:.6} {:.6} {:.6} {:.6}\n",
+                    start.x, start.y, start.z, end.x, end.y, end.z
+                )
             })
             .collect();
-        let tag = |text: &str, tag: &str| text.lines().map(|line| format!("{tag}: {line}\n")).collect::<String>();
-        let graph = tag(&drifted, "Vertex") + &tag(&points, "Mappoint") + &tag(&lines, "Mapline") + &self.tagged(graph);
+        let tag =
+            |text: &str, tag: &str| text.lines().map(|line| format!("{tag}: {line}\n")).collect::<String>();
+        let graph = tag(&drifted, "Vertex")
+            + &tag(&points, "Mappoint")
+            + &tag(&lines, "Mapline")
+            + &self.tagged(graph);
         let files = |files: &[(&str, String)]| {
             files.iter().map(|(name, text)| ((*name).to_owned(), text.clone())).collect::<BTreeMap<_, _>>()
         };
@@ -228,7 +244,7 @@ impl Scene {
 
 impl Release {
     /// Writes `observation.zip` and `baseline.zip`; archives without files are not written.
-    pub fn write_archives(&self, folder: &Path) {
+    pub(crate) fn write_archives(&self, folder: &Path) {
         fs::create_dir_all(folder).unwrap();
         for (name, files) in [("observation", &self.observation), ("baseline", &self.baseline)] {
             if files.is_empty() {

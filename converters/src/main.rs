@@ -22,7 +22,7 @@ fn main() -> ExitCode {
     let cli = Cli::parse();
     // Without a handler an interrupted program merely leaves a temporary file behind.
     let _ = ctrlc::set_handler(|| {
-        open_structure::format::discard_unfinished();
+        ::open_structure::format::discard_unfinished();
         std::process::exit(130);
     });
     let mut stdout = io::stdout().lock();

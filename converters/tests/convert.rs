@@ -47,9 +47,7 @@ fn median_px(sequence: &Sequence, rows: impl Iterator<Item = (i64, i64, f64, f64
     let poses: BTreeMap<i64, _> = sequence
         .frames
         .iter()
-        .filter_map(|frame| {
-            Some((frame.frame_id.0, frame.world_from_camera()?.pose().unwrap().inverse()))
-        })
+        .filter_map(|frame| Some((frame.frame_id.0, frame.world_from_camera()?.pose().unwrap().inverse())))
         .collect();
     let points: BTreeMap<i64, Point3<f64>> =
         sequence.point_landmarks.iter().map(|point| (point.point_id.0, point.position())).collect();
@@ -90,10 +88,12 @@ fn a_noise_free_association_becomes_observations_and_the_graph_measurements() {
     assert_eq!(noise.parameters["sigma_depth_m"], 0.05);
     assert_eq!(manifest.source.files.len(), 2);
 
-    let observed = sequence.point_observations.iter().map(|row| (row.frame_id.0, row.point_id.0, row.u, row.v));
+    let observed =
+        sequence.point_observations.iter().map(|row| (row.frame_id.0, row.point_id.0, row.u, row.v));
     // Six digits of a pixel below 1000.
     assert!(median_px(&sequence, observed) < 1e-3);
-    let measured = sequence.point_measurements.iter().map(|row| (row.frame_id.0, row.point_id.0, row.u, row.v));
+    let measured =
+        sequence.point_measurements.iter().map(|row| (row.frame_id.0, row.point_id.0, row.u, row.v));
     // The median length of two unit Gaussians is √(2 ln 2) = 1.18; some 4000 rows.
     assert!((median_px(&sequence, measured) - 1.177).abs() < 0.1);
 }
@@ -105,7 +105,10 @@ fn depths_and_unrefined_lines_are_recovered() {
     let recovered: BTreeMap<&str, u64> =
         sequence.manifest.recovered.iter().map(|recovery| (recovery.table.as_str(), recovery.rows)).collect();
     let points = sequence.point_observations.len() as u64;
-    assert_eq!(recovered, BTreeMap::from([("map_lines", scene.lines.len() as u64), ("point_observations", points)]));
+    assert_eq!(
+        recovered,
+        BTreeMap::from([("map_lines", scene.lines.len() as u64), ("point_observations", points)])
+    );
     for row in &sequence.point_observations {
         let truth = scene.depth_of_point(row.frame_id.0, row.point_id.0);
         // Landmarks and poses have six decimals.
@@ -118,7 +121,9 @@ fn depths_and_unrefined_lines_are_recovered() {
         let truth = scene.lines[&line.line_id.0].unrefined;
         let (on_truth, covers) = (truth.plucker().unwrap(), found.length() / truth.length());
         // Pixels of six digits at 4 m: micrometres, times the number of views' share; 0.1 mm is generous.
-        assert!(on_truth.distance_to_point(found.start) < 1e-4 && on_truth.distance_to_point(found.end) < 1e-4);
+        assert!(
+            on_truth.distance_to_point(found.start) < 1e-4 && on_truth.distance_to_point(found.end) < 1e-4
+        );
         assert!((covers - 1.0).abs() < 1e-3, "{covers}");
         // The published line was turned by degrees, and keeps its direction's sign in the recovered one.
         let angle = published[&line.line_id.0].plucker().unwrap().angle_to(&found.plucker().unwrap());
@@ -170,7 +175,8 @@ fn other_rows_of_a_noisy_graph_stay_in_its_factors() {
         .find(|row| Some(row.frame_id) == factor.frame_id && Some(row.point_id) == factor.point_id)
         .unwrap();
     assert_ne!(factor.measurement, [row.u, row.v]);
-    let notes: Vec<_> = sequence.manifest.generator.parameters.iter().filter(|(key, _)| key.starts_with("note")).collect();
+    let notes: Vec<_> =
+        sequence.manifest.generator.parameters.iter().filter(|(key, _)| key.starts_with("note")).collect();
     assert!(notes.iter().any(|(_, note)| note.contains("the graph has other ones")), "{notes:?}");
 }
 
@@ -195,9 +201,13 @@ fn lines_that_were_never_published_are_recovered() {
         assert!(truth.plucker().unwrap().distance_to_line(&line.plucker()) < 1e-4);
         assert!(truth.plucker().unwrap().angle_to(&line.plucker()) < 1e-4);
     }
-    let recovery = &sequence.manifest.recovered.iter().find(|recovery| recovery.table == "line_landmarks").unwrap();
+    let recovery =
+        &sequence.manifest.recovered.iter().find(|recovery| recovery.table == "line_landmarks").unwrap();
     assert_eq!(recovery.ids, scene.lines.keys().copied().collect::<Vec<_>>());
-    assert!(sequence.map_lines.is_empty(), "there is no published line that these would be the unrefined ones of");
+    assert!(
+        sequence.map_lines.is_empty(),
+        "there is no published line that these would be the unrefined ones of"
+    );
 }
 
 #[test]
@@ -239,7 +249,12 @@ fn what_cannot_be_used_is_counted_with_file_and_line() {
         ("association.txt", "depth is not positive; the row is kept without it", 1, Some(first + 4)),
         ("association.txt", "frame or landmark id is negative or too large", 1, Some(first + 2)),
         ("association.txt", "landmark comes again in the frame; the first row is kept", 1, Some(first + 1)),
-        ("association.txt", "line cannot be fitted to its rows: fewer than two views or no parallax (lines 900)", 1, None),
+        (
+            "association.txt",
+            "line cannot be fitted to its rows: fewer than two views or no parallax (lines 900)",
+            1,
+            None,
+        ),
         ("association.txt", "malformed-number: not a number", 1, Some(first)),
         ("association.txt", "point without landmark cannot be triangulated", 1, None),
         ("structline_landmarks.txt", "line landmark has no length", 1, Some(scene.lines.len() as u64 + 1)),
@@ -247,7 +262,10 @@ fn what_cannot_be_used_is_counted_with_file_and_line() {
     assert_eq!(excluded, expected);
     // A row of a frame that nothing else names is kept, and its frame with it, without a pose.
     let frame = sequence.frames.last().unwrap();
-    assert_eq!((frame.frame_id.0, frame.stamp_nanos, frame.world_from_camera()), (5000, 166_666_666_667, None));
+    assert_eq!(
+        (frame.frame_id.0, frame.stamp_nanos, frame.world_from_camera()),
+        (5000, 166_666_666_667, None)
+    );
     let row = sequence.point_observations.last().unwrap();
     assert_eq!((row.frame_id.0, row.point_id.0, row.u, row.depth), (5000, 100_000, 100.5, None));
     let line = sequence.line_observations.iter().find(|row| row.line_id.0 == 900).unwrap();
@@ -277,7 +295,9 @@ fn several_sequences_give_the_same_bytes_with_any_number_of_threads() {
     let scene = Scene::new();
     let dataset = folder.path().join("dataset");
     for seed in 1..4 {
-        scene.release(Noise::None, Noise::FirstRelease { seed }).write_archives(&dataset.join(format!("box{seed}")));
+        scene
+            .release(Noise::None, Noise::FirstRelease { seed })
+            .write_archives(&dataset.join(format!("box{seed}")));
     }
     let dataset = dataset.to_str().unwrap();
     let output = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
@@ -319,7 +339,8 @@ fn a_broken_archive_fails_alone_and_leaves_nothing() {
     let out = folder.path().join("out");
     // What an interrupted run may have left.
     fs::create_dir_all(out.join(".a.1.partial")).unwrap();
-    let (code, table, told) = os_convert(&[dataset.to_str().unwrap(), "-o", out.to_str().unwrap(), "--keep-going"], 2);
+    let (code, table, told) =
+        os_convert(&[dataset.to_str().unwrap(), "-o", out.to_str().unwrap(), "--keep-going"], 2);
     assert_eq!(code, 1, "{told}");
     assert!(told.contains("error: b:") && table.contains('a'), "{table} {told}");
     assert!(out.join("a/sequence.json").is_file() && !out.join("b").exists());
@@ -335,7 +356,8 @@ fn a_camera_of_no_family_can_be_given() {
     let (code, table, _) = os_convert(&[place, "-o", out.to_str().unwrap()], 2);
     assert!(code == 3 && table.contains("no known camera fits"), "{code} {table}");
     let camera = "700,710,400,300,800,600";
-    let (code, table, told) = os_convert(&[place, "-o", out.to_str().unwrap(), "--force", "--camera", camera], 2);
+    let (code, table, told) =
+        os_convert(&[place, "-o", out.to_str().unwrap(), "--force", "--camera", camera], 2);
     assert_eq!(code, 0, "{table} {told}");
     let sequence = format::read(&out).unwrap();
     assert_eq!((sequence.manifest.cameras[0].fx, sequence.manifest.cameras[0].width), (700.0, 800));

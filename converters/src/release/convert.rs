@@ -19,8 +19,8 @@ use crate::family::{Choice, Clues, Sight, choose, sight};
 use crate::text_release::{PoseFile, TextSequence};
 use open_structure::geometry::{PinholeCamera, PluckerLine};
 use open_structure::structure::{
-    CameraId, Frame, FrameId, LineId, LineLandmark, PointLandmark, Recovery, Sequence,
-    frame_statistics, line_correspondences, point_correspondences, registry,
+    CameraId, Frame, FrameId, LineId, LineLandmark, PointLandmark, Recovery, Sequence, frame_statistics,
+    line_correspondences, point_correspondences, registry,
 };
 use std::collections::{BTreeMap, BTreeSet};
 

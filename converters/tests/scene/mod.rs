@@ -31,7 +31,9 @@ impl Draw {
 pub enum Noise {
     None,
     /// 1 px; 0.05 m, of which what exceeds 0.1 m is replaced by 0.08 m.
-    FirstRelease { seed: u64 },
+    FirstRelease {
+        seed: u64,
+    },
 }
 
 /// A line as it was observed, and as it was published: turned about its midpoint.
@@ -83,7 +85,8 @@ impl Scene {
         let frames = (0..32)
             .map(|index| {
                 let turn = f64::from(index) / 31.0 - 0.5;
-                let translation = Vector3::new(1.6 * turn, 0.4 * (3.0 * turn).sin(), -4.0 + turn).map(printed);
+                let translation =
+                    Vector3::new(1.6 * turn, 0.4 * (3.0 * turn).sin(), -4.0 + turn).map(printed);
                 let rotation = UnitQuaternion::from_euler_angles(0.05 * turn, -0.3 * turn, 0.1 * turn);
                 let components = rotation.coords.map(printed);
                 let pose = Pose::from_components(translation.into(), components.into()).unwrap();
@@ -105,7 +108,8 @@ impl Scene {
                 let half = between(0.25, 0.4);
                 // Two to three degrees, as the release's lines were turned.
                 let axis = direction.cross(&Vector3::new(between(-1.0, 1.0), 0.3, between(0.5, 1.0)));
-                let turned = UnitQuaternion::from_scaled_axis(axis.normalize() * between(0.035, 0.05)) * direction;
+                let turned =
+                    UnitQuaternion::from_scaled_axis(axis.normalize() * between(0.035, 0.05)) * direction;
                 let sign = if id % 2 == 0 { 1.0 } else { -1.0 };
                 let segment = |along: Vector3<f64>| Segment {
                     start: printed_point(midpoint - along * half * sign),
@@ -124,7 +128,8 @@ impl Scene {
     /// What every frame sees, without noise; ends in alternating order.
     pub fn rows(&self) -> SceneRows {
         let mut rows = SceneRows { points: Vec::new(), lines: Vec::new() };
-        let inside = |pixel: &Point2<f64>| (0.0..=640.0).contains(&pixel.x) && (0.0..=480.0).contains(&pixel.y);
+        let inside =
+            |pixel: &Point2<f64>| (0.0..=640.0).contains(&pixel.x) && (0.0..=480.0).contains(&pixel.y);
         for (frame, pose) in &self.frames {
             let camera_from_world = pose.inverse();
             let see = |point: Point3<f64>| {
@@ -177,8 +182,12 @@ impl Scene {
             text.push_str(" \n");
         }
         for group in 0..2 {
-            let ids: Vec<String> =
-                self.lines.iter().filter(|(_, line)| line.group == group).map(|(id, _)| id.to_string()).collect();
+            let ids: Vec<String> = self
+                .lines
+                .iter()
+                .filter(|(_, line)| line.group == group)
+                .map(|(id, _)| id.to_string())
+                .collect();
             writeln!(text, "ParalineMaplineAsso: {group} {} {}", ids.len(), ids.join("  ")).unwrap();
         }
         text
@@ -201,11 +210,18 @@ impl Scene {
             .iter()
             .map(|(id, line)| {
                 let Segment { start, end } = line.published;
-                format!("{id} {:.6} {:.6} {:.6} {:.6} {:.6} {:.6}\n", start.x, start.y, start.z, end.x, end.y, end.z)
+                format!(
+                    "{id} {:.6} {:.6} {:.6} {:.6} {:.6} {:.6}\n",
+                    start.x, start.y, start.z, end.x, end.y, end.z
+                )
             })
             .collect();
-        let tag = |text: &str, tag: &str| text.lines().map(|line| format!("{tag}: {line}\n")).collect::<String>();
-        let graph = tag(&drifted, "Vertex") + &tag(&points, "Mappoint") + &tag(&lines, "Mapline") + &self.tagged(graph);
+        let tag =
+            |text: &str, tag: &str| text.lines().map(|line| format!("{tag}: {line}\n")).collect::<String>();
+        let graph = tag(&drifted, "Vertex")
+            + &tag(&points, "Mappoint")
+            + &tag(&lines, "Mapline")
+            + &self.tagged(graph);
         let files = |files: &[(&str, String)]| {
             files.iter().map(|(name, text)| ((*name).to_owned(), text.clone())).collect::<BTreeMap<_, _>>()
         };

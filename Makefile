@@ -46,6 +46,8 @@ fuzz:
 conformance-corpus:
 	cargo run --quiet --locked --example conformance_corpus -- $(CORPUS)
 
-# What is generated in spec/ and the sample, written anew.
+# What is generated in spec/, the sample and the README, written anew.
 spec:
-	UPDATE_SPEC=1 UPDATE_SAMPLE=1 cargo test --workspace --locked --test spec_sync --test sample_sequence
+	cargo build --workspace --bins --locked
+	UPDATE_SPEC=1 UPDATE_SAMPLE=1 UPDATE_README=1 cargo test --workspace --locked \
+	  --test spec_sync --test sample_sequence --test readme

@@ -6,3 +6,8 @@ pub mod format;
 pub mod geometry;
 pub mod structure;
 pub mod validate;
+
+/// The README's Rust compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

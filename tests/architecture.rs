@@ -2,6 +2,8 @@
 //!
 //! Reads the source text, so that it also sees what no build of this machine compiles.
 
+#![expect(clippy::unwrap_used, reason = "tests")]
+
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -157,7 +159,7 @@ fn converters_meet_the_tools_in_files_alone() {
     for (path, text) in files("converters/src") {
         for (number, line) in code(&text) {
             for room in names_after(line, "open_structure::") {
-                if !["format", "geometry", "structure", "validate"].contains(&room) {
+                if ["simulate", "track", "adjust", "evaluate", "cli"].contains(&room) {
                     wrong.push(format!("{path}:{number}: names open_structure::{room}"));
                 }
             }
@@ -177,7 +179,7 @@ fn every_room_and_every_file_says_what_it_is_for() {
     }
     for (path, text) in files("src").into_iter().chain(files("converters/src")) {
         let first = text.lines().next().unwrap_or_default();
-        if !first.strip_prefix("//! ").is_some_and(|words| words.len() > 10) && !path.ends_with("/tests.rs") {
+        if first.strip_prefix("//! ").is_none_or(|words| words.len() <= 10) && !path.ends_with("/tests.rs") {
             wrong.push(format!("{path} begins with `{first}`, not with what it is for"));
         }
     }

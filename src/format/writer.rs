@@ -382,11 +382,12 @@ pub fn write(path: &Path, sequence: &Sequence, options: WriteOptions) -> Result<
     macro_rules! whole {
         ($($name:ident: $row:ident,)+) => {
             $(
-                if crate::structure::$row::TABLE.storage == Storage::Whole
-                    && stringify!($name) != Frame::TABLE.name
-                    && !sequence.$name.is_empty()
-                {
-                    writer.append(&sequence.$name)?;
+                if stringify!($name) != Frame::TABLE.name && !sequence.$name.is_empty() {
+                    // All at once, as a copy does, so that the same sequence gives the same bytes.
+                    writer.declare::<crate::structure::$row>()?;
+                    if crate::structure::$row::TABLE.storage == Storage::Whole {
+                        writer.append(&sequence.$name)?;
+                    }
                 }
             )+
         };

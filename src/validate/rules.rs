@@ -68,182 +68,182 @@ macro_rules! rules {
 }
 
 rules! {
-    ContainerReadable: "container-readable", Error, "Container",
+    ContainerReadable: "container-readable", Error, "3",
         "A sequence MUST be an MCAP file or a Parquet folder that can be decoded throughout.",
         None, "1.0.0";
-    ContainerChecksums: "container-checksums", Error, "Container",
-        "Every checksum of an MCAP file MUST be right.",
+    ContainerChecksums: "container-checksums", Error, "9.1",
+        "Every CRC of an MCAP file MUST be right.",
         None, "1.0.0";
-    McapProfileEmpty: "mcap-profile-empty", Error, "Container",
+    McapProfileEmpty: "mcap-profile-empty", Error, "9.1",
         "The profile of an MCAP file MUST be the empty string.",
         None, "1.0.0";
-    McapIdentity: "mcap-identity", Error, "Container",
-        "An MCAP file MUST hold one Metadata record `open-structure` whose `spec_version` and `name` equal the manifest's.",
+    McapIdentity: "mcap-identity", Error, "9.2",
+        "An MCAP file MUST hold one Metadata record `open-structure` whose `spec_version` and `name` equal those of the manifest.",
         None, "1.0.0";
-    McapIndexed: "mcap-indexed", Error, "Container",
-        "An MCAP file MUST be chunked and have a summary section with statistics, chunk indexes, message indexes and repeated channels and schemas.",
+    McapIndexed: "mcap-indexed", Error, "9.1",
+        "An MCAP file MUST be chunked and have a summary section with statistics, chunk index, message indexes, and repeated channels and schemas.",
         Some("A reader finds one frame of a large file without reading the rest."), "1.0.0";
-    McapSchemasEmbedded: "mcap-schemas-embedded", Error, "Container",
+    McapSchemasEmbedded: "mcap-schemas-embedded", Error, "9.4",
         "A table's channel MUST carry its Arrow schema, and a JSON channel a JSON Schema that its messages satisfy.",
         None, "1.0.0";
-    McapMessageTimes: "mcap-message-times", Error, "Container",
-        "The manifest and the tables of the whole sequence MUST be stamped with the first frame's stamp, rows of a frame with the frame's stamp, table summaries with the last frame's stamp; log times MUST NOT fall in file order.",
+    McapMessageTimes: "mcap-message-times", Error, "9.3",
+        "The manifest and the tables that are stored whole MUST be stamped with the first frame's stamp, rows of a frame with its stamp, and table summaries with the last frame's; log times MUST NOT fall in file order.",
         None, "1.0.0";
-    McapOneMessagePerFrame: "mcap-one-message-per-frame", Error, "Container",
-        "A per-frame table MUST have at most one message for each frame, holding rows of that frame alone.",
+    McapOneMessagePerFrame: "mcap-one-message-per-frame", Error, "9.3",
+        "A table that is stored per frame MUST have at most one message for each frame, with the rows of that frame alone.",
         None, "1.0.0";
-    ManifestSchema: "manifest-schema", Error, "Manifest",
+    ManifestSchema: "manifest-schema", Error, "5",
         "The manifest MUST satisfy its JSON Schema.",
         None, "1.0.0";
-    ManifestVersion: "manifest-version", Error, "Manifest",
-        "`spec_version` MUST be `major.minor.patch` with a known major version.",
+    ManifestVersion: "manifest-version", Error, "5",
+        "`spec_version` MUST be `major.minor.patch` with a known major version; this text describes major version 1.",
         None, "1.0.0";
-    ManifestName: "manifest-name", Error, "Manifest",
+    ManifestName: "manifest-name", Error, "5",
         "`name` MUST NOT be empty, nor contain `/`, `\\` or control characters.",
         Some("Tools make file names of it."), "1.0.0";
-    ManifestConventions: "manifest-conventions", Error, "Manifest",
-        "`conventions` MUST hold the values of version 1.",
+    ManifestConventions: "manifest-conventions", Error, "5.4",
+        "`conventions` MUST hold the values of version 1: `world_from_camera`, `hamilton-xyzw`, `z`, `m`, `rad`, `px`, `ns`.",
         None, "1.0.0";
-    CamerasValid: "cameras-valid", Error, "Manifest",
-        "Camera ids MUST be unique and not negative, sizes positive, intrinsics finite with `fx` positive and `fy` not zero, and depth limits positive and in order.",
+    CamerasValid: "cameras-valid", Error, "5.5",
+        "Camera ids MUST be unique and at least 0; `width` and `height` at least 1; `fx`, `fy`, `cx` and `cy` finite; `fx` greater than 0; `fy` not 0; `depth_min` and `depth_max`, where given, greater than 0 and in this order.",
         None, "1.0.0";
-    CameraAxes: "camera-axes", Error, "Manifest",
+    CameraAxes: "camera-axes", Error, "5.5",
         "`axes` MUST be `right-up-forward` exactly when `fy` is negative.",
         None, "1.0.0";
-    RegistryClosed: "registry-closed", Error, "Manifest",
+    RegistryClosed: "registry-closed", Error, "5.1",
         "Values of closed families (camera model, camera axes, pixel origin, clock) MUST be registered.",
         Some("A reader that does not know them cannot use the numbers."), "1.0.0";
-    RegistryOpen: "registry-open", Advice, "Manifest",
-        "Values of open families (group kind, noise model, factor kind, estimate, removed distortion) SHOULD be taken from the registry where it has one that fits.",
+    RegistryOpen: "registry-open", Advice, "5.1",
+        "Values of open families (removed distortion, group kind, noise model, estimate, factor kind) are best taken from the registry.",
         None, "1.0.0";
-    UnknownContent: "unknown-content", Advice, "Manifest",
-        "Columns, tables, topics, files and manifest fields that this version does not know are passed over.",
+    UnknownContent: "unknown-content", Advice, "12",
+        "Readers pass over columns, tables, topics, files and manifest members that they do not know, and a validator mentions them.",
         None, "1.0.0";
-    SourceDocumented: "source-documented", Advice, "Manifest",
-        "The licence and the citation of the source SHOULD be given.",
+    SourceDocumented: "source-documented", Advice, "5.2",
+        "`licence` and `citation` of the source are best given.",
         None, "1.0.0";
-    FramesPresent: "frames-present", Error, "Tables",
+    FramesPresent: "frames-present", Error, "3",
         "The table `frames` MUST be there.",
         None, "1.0.0";
-    TablesListed: "tables-listed", Error, "Tables",
+    TablesListed: "tables-listed", Error, "5.9",
         "The table summaries MUST list exactly the known tables that are there, each once.",
         None, "1.0.0";
-    TableRows: "table-rows", Error, "Tables",
-        "The number of rows of a table MUST equal its summary's.",
+    TableRows: "table-rows", Error, "5.9",
+        "The number of rows of a table MUST equal that of its summary.",
         None, "1.0.0";
-    TableDigest: "table-digest", Error, "Tables",
-        "The digest of a table MUST equal its summary's.",
+    TableDigest: "table-digest", Error, "5.9",
+        "The digest of a table MUST equal that of its summary.",
         Some("It is the same in both encodings, so a copy can be held against its original."), "1.0.0";
-    ColumnsPresent: "columns-present", Error, "Tables",
+    ColumnsPresent: "columns-present", Error, "6.1",
         "Columns that are not nullable MUST be there.",
         None, "1.0.0";
-    ColumnsTyped: "columns-typed", Error, "Tables",
+    ColumnsTyped: "columns-typed", Error, "6.1",
         "Columns MUST have the types of this specification.",
         None, "1.0.0";
-    ColumnsNotNull: "columns-not-null", Error, "Tables",
+    ColumnsNotNull: "columns-not-null", Error, "6.1",
         "Values of columns that are not nullable, and elements of lists, MUST NOT be null.",
         None, "1.0.0";
-    RowsOrdered: "rows-ordered", Error, "Tables",
-        "Rows MUST be sorted by the table's key, ascending.",
+    RowsOrdered: "rows-ordered", Error, "6.1",
+        "Rows MUST be sorted by key, ascending; text is compared byte by byte.",
         Some("One frame is found without reading the others."), "1.0.0";
-    KeysUnique: "keys-unique", Error, "Tables",
+    KeysUnique: "keys-unique", Error, "6.1",
         "A key MUST NOT occur twice in a table.",
         None, "1.0.0";
-    IdsNotNegative: "ids-not-negative", Error, "Tables",
+    IdsNotNegative: "ids-not-negative", Error, "4.7",
         "Ids and row numbers MUST NOT be negative.",
         None, "1.0.0";
-    ValuesFinite: "values-finite", Error, "Tables",
+    ValuesFinite: "values-finite", Error, "4.8",
         "Floats MUST be finite.",
         Some("What is not known is null, not NaN."), "1.0.0";
-    StampsOrdered: "stamps-ordered", Error, "Frames and poses",
+    StampsOrdered: "stamps-ordered", Error, "6.2",
         "Stamps MUST NOT be negative and MUST NOT fall from frame to frame.",
         None, "1.0.0";
-    CameraKnown: "camera-known", Error, "Frames and poses",
+    CameraKnown: "camera-known", Error, "6.2",
         "The camera of a frame MUST be in the manifest.",
         None, "1.0.0";
-    PoseWhole: "pose-whole", Error, "Frames and poses",
+    PoseWhole: "pose-whole", Error, "6.2",
         "The seven pose columns of a frame MUST be present together or absent together.",
         None, "1.0.0";
-    QuaternionUnit: "quaternion-unit", Error, "Frames and poses",
+    QuaternionUnit: "quaternion-unit", Error, "4.3",
         "Quaternions MUST have unit length within 1e-3.",
         Some("Sources print as few as four decimals and their digits are kept; readers normalise."), "1.0.0";
-    FrameKnown: "frame-known", Error, "References",
+    FrameKnown: "frame-known", Error, "6.1",
         "A frame id in any table MUST be in `frames`.",
         None, "1.0.0";
-    LandmarkKnown: "landmark-known", Warning, "References",
+    LandmarkKnown: "landmark-known", Warning, "6.1",
         "A landmark that is measured or observed SHOULD be in its landmark table, where that table is there.",
         None, "1.0.0";
-    LandmarkSeen: "landmark-seen", Advice, "References",
-        "A landmark SHOULD be seen by at least one row.",
+    LandmarkSeen: "landmark-seen", Advice, "6.1",
+        "A landmark is best shown by at least one row.",
         None, "1.0.0";
-    CorrespondencesAgree: "correspondences-agree", Error, "References",
-        "An entry of a correspondence MUST name a row of its table that shows the landmark in that frame, and every row of the table MUST be in it once.",
+    CorrespondencesAgree: "correspondences-agree", Error, "6.10",
+        "Each entry of a correspondence MUST name a row of its table that shows this landmark in this frame; `frame_ids` and `rows` have equal lengths; `table` is one of the two tables of the kind; every row of the table is named once.",
         None, "1.0.0";
-    EstimatesDistinct: "estimates-distinct", Advice, "References",
+    EstimatesDistinct: "estimates-distinct", Advice, "6.3",
         "Two estimates with identical poses are probably one.",
         None, "1.0.0";
-    PixelInImage: "pixel-in-image", Warning, "Measurements",
-        "Pixel positions SHOULD lie in the image widened by 1 px for observations, and by 6 sigma for measurements.",
+    PixelInImage: "pixel-in-image", Warning, "6.19",
+        "Pixel positions SHOULD lie within the image, widened by 1 px for observations and by 6 sigma for measurements; sigma is that of the declared noise, else 1 px.",
         Some("Noise carries measurements over the edge; sigma is the declared one, else 1 px."), "1.0.0";
-    DepthPositive: "depth-positive", Error, "Measurements",
-        "Depths MUST be positive.",
+    DepthPositive: "depth-positive", Error, "4.4",
+        "Depths MUST be greater than 0.",
         None, "1.0.0";
-    SegmentPixelsDistinct: "segment-pixels-distinct", Warning, "Measurements",
+    SegmentPixelsDistinct: "segment-pixels-distinct", Warning, "6.19",
         "The two ends of a segment SHOULD differ.",
         None, "1.0.0";
-    LineFormsAgree: "line-forms-agree", Error, "Lines and groups",
-        "The three forms of a line landmark MUST say the same line, within 1e-9 rad and 1e-9 m (times the line's distance from the origin where that is over 1 m).",
+    LineFormsAgree: "line-forms-agree", Error, "6.5",
+        "The three forms of a line landmark MUST say the same line: angle at most 1e-9 rad, distance at most 1e-9 m times max(1, distance from the origin in metres).",
         None, "1.0.0";
-    PluckerConstraint: "plucker-constraint", Error, "Lines and groups",
-        "The direction of a line MUST have unit length and be perpendicular to the moment, within 1e-9.",
+    PluckerConstraint: "plucker-constraint", Error, "6.5",
+        "Moment and direction MUST be perpendicular, `|n · d| ≤ 1e-9 max(1, |n|)`, and the direction of unit length within 1e-9.",
         None, "1.0.0";
-    SegmentLength: "segment-length", Error, "Lines and groups",
+    SegmentLength: "segment-length", Error, "6.5",
         "The ends of a line landmark MUST NOT coincide.",
         None, "1.0.0";
-    GroupLinesKnown: "group-lines-known", Warning, "Lines and groups",
+    GroupLinesKnown: "group-lines-known", Warning, "6.6",
         "Lines of a group SHOULD be in `line_landmarks`, where that table is there.",
         None, "1.0.0";
-    GroupLinesUnique: "group-lines-unique", Error, "Lines and groups",
+    GroupLinesUnique: "group-lines-unique", Error, "6.6",
         "A group MUST list at least one line, ascending without repetition, and a line MUST be in at most one group of a kind.",
         None, "1.0.0";
-    GroupLinesParallel: "group-lines-parallel", Error, "Lines and groups",
-        "Lines of a parallel group MUST be parallel to the group's direction within 1e-3 rad, whichever way they are directed.",
+    GroupLinesParallel: "group-lines-parallel", Error, "6.6",
+        "Lines of a `parallel` group MUST be parallel to the group's direction within 1e-3 rad, whatever their sign.",
         Some("A solver may share one direction among them."), "1.0.0";
-    GroupDirection: "group-direction", Error, "Lines and groups",
-        "The direction of a group MUST be whole and of unit length within 1e-6; it may be absent only if no line of the group has a landmark.",
+    GroupDirection: "group-direction", Error, "6.6",
+        "The direction of a group MUST be whole, and of unit length within 1e-6; it is absent only if no line of the group has a landmark.",
         None, "1.0.0";
-    GraphVerticesKnown: "graph-vertices-known", Error, "Graphs",
+    GraphVerticesKnown: "graph-vertices-known", Error, "6.14",
         "The vertices of a factor MUST be in the vertex tables of its graph.",
         None, "1.0.0";
-    GraphFactorShape: "graph-factor-shape", Error, "Graphs",
+    GraphFactorShape: "graph-factor-shape", Error, "6.14",
         "A factor of a registered kind MUST name the vertices, and have the numbers of `measurement` and `information`, that the registry gives.",
         None, "1.0.0";
-    GraphInformationPositive: "graph-information-positive", Error, "Graphs",
-        "Information matrices MUST be finite and positive semi-definite.",
+    GraphInformationPositive: "graph-information-positive", Error, "6.14",
+        "Information matrices MUST be positive semi-definite.",
         None, "1.0.0";
-    FrameStatisticsAgree: "frame-statistics-agree", Error, "Statistics of a sequence",
+    FrameStatisticsAgree: "frame-statistics-agree", Error, "6.15",
         "`frame_statistics` MUST have one row for each frame, with the counts that its definition gives.",
         None, "1.0.0";
-    PointObservationsReproject: "point-observations-reproject", Error, "Statistics of a sequence",
+    PointObservationsReproject: "point-observations-reproject", Error, "7",
         "A noise-free point observation MUST lie within 0.5 px of its landmark's image through the true pose, and its depth within 1 cm or 1 %.",
         None, "1.0.0";
-    LineObservationsReproject: "line-observations-reproject", Warning, "Statistics of a sequence",
+    LineObservationsReproject: "line-observations-reproject", Warning, "7",
         "Both ends of a noise-free line observation SHOULD lie within 0.5 px of the image of their landmark's line through the true pose.",
         None, "1.0.0";
-    NoiseDeclared: "noise-declared", Warning, "Statistics of a sequence",
+    NoiseDeclared: "noise-declared", Warning, "5.7",
         "A sequence with measurements SHOULD declare their noise.",
         None, "1.0.0";
-    NoiseAgrees: "noise-agrees", Error, "Statistics of a sequence",
-        "Residuals of measurements against the truth MUST agree with the declared noise: their robust sigma (1.4826 times the median of absolute values) within 10 % and four standard errors.",
+    NoiseAgrees: "noise-agrees", Error, "7",
+        "Residuals of measurements against the truth MUST agree with the declared noise: their robust sigma within 10 % and four standard errors, in pixels, and in depth where that is declared.",
         Some("Judged from landmarks that are where their rows see them, so that a wrong landmark is not taken for noise."), "1.0.0";
-    MeasurementsNoisy: "measurements-noisy", Advice, "Statistics of a sequence",
-        "Measurements SHOULD carry noise of at least 0.05 px.",
+    MeasurementsNoisy: "measurements-noisy", Advice, "7",
+        "Measurements are best noisy, by at least 0.05 px.",
         Some("On measurements that equal observations an optimiser ends at zero, which compares nothing."), "1.0.0";
-    PointLandmarksTriangulate: "point-landmarks-triangulate", Error, "Statistics of a sequence",
-        "A point landmark that at least three rows show MUST be where they triangulate to through the true poses: moving it there lowers the sum of squared residuals by at most 60 sigma².",
+    PointLandmarksTriangulate: "point-landmarks-triangulate", Error, "7",
+        "A point landmark that at least three rows show MUST be where they triangulate to through the true poses: excess chi-square at most 60.",
         Some("Sigma is the declared one or the found one, at least 0.5 px. A right landmark exceeds 60 once in 1e12 times."), "1.0.0";
-    LineLandmarksTriangulate: "line-landmarks-triangulate", Warning, "Statistics of a sequence",
-        "A line landmark that at least three rows show SHOULD be where they triangulate to, as for points, with the distances of segment ends from the line's image.",
+    LineLandmarksTriangulate: "line-landmarks-triangulate", Warning, "7",
+        "A line landmark that at least three rows show SHOULD be where they triangulate to, as for points, with the distances of both ends to the image of the line.",
         Some("Lines that were turned to be parallel after they were observed are found by this."), "1.0.0";
 }
 

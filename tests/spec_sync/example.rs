@@ -11,10 +11,10 @@ use open_structure::structure::*;
 /// The sequence: one frame that measures one point.
 fn tiny() -> Sequence {
     let mut sequence = Sequence::default();
-    sequence.manifest.name = "tiny".to_owned();
-    sequence.manifest.source.dataset = registry::SIMULATION.to_owned();
-    sequence.manifest.generator.tool = "by hand".to_owned();
-    sequence.manifest.generator.version = "1".to_owned();
+    "tiny".clone_into(&mut sequence.manifest.name);
+    registry::SIMULATION.clone_into(&mut sequence.manifest.source.dataset);
+    "by hand".clone_into(&mut sequence.manifest.generator.tool);
+    "1".clone_into(&mut sequence.manifest.generator.version);
     let camera = open_structure::geometry::PinholeCamera {
         fx: 500.0,
         fy: 500.0,
@@ -305,4 +305,16 @@ fn the_example_is_a_sequence_like_any_other() {
 #[test]
 fn the_example_has_the_same_bytes_whenever_it_is_written() {
     assert_eq!(tiny_mcap(), tiny_mcap());
+}
+
+#[test]
+fn a_copy_by_way_of_parquet_has_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let [first, parquet, second] =
+        ["first.mcap", "parquet", "second.mcap"].map(|name| folder.path().join(name));
+    format::write(&first, &crate::sample::sample(), WriteOptions::default()).unwrap();
+    for (from, to) in [(&first, &parquet), (&parquet, &second)] {
+        format::copy(&format::open(from).unwrap(), to, WriteOptions::default(), &|_, _| {}).unwrap();
+    }
+    assert!(fs::read(first).unwrap() == fs::read(second).unwrap(), "the bytes differ");
 }

@@ -1,6 +1,8 @@
 //! The specification, the schemas and the code say the same: what is generated in `spec/` is compared, or written
 //! anew with `UPDATE_SPEC=1 cargo test --workspace --test spec_sync`.
 
+#![expect(clippy::unwrap_used, reason = "tests")]
+
 mod document;
 mod example;
 mod ordered;

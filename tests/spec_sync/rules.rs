@@ -2,6 +2,9 @@
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
+use std::fs;
+
+use open_structure::validate::RULES;
 
 use crate::document::read_spec;
 
@@ -12,6 +15,8 @@ struct Rule {
     /// `error` for MUST, `warning` for SHOULD, `advice`.
     severity: &'static str,
     section: String,
+    /// What must or should hold, without the word `Advice:` and the name.
+    statement: String,
 }
 
 /// Names in the manner of `{rule-name}` in a line.
@@ -41,7 +46,8 @@ fn rules(text: &str) -> Vec<Rule> {
             [id] => rules.push(Rule {
                 id: (*id).to_owned(),
                 severity,
-                section: section.trim_end_matches('.').to_owned(),
+                section: section.to_owned(),
+                statement: statement(line, id),
             }),
             found => panic!("a statement names one rule, not {found:?}: {line}"),
         }
@@ -49,12 +55,24 @@ fn rules(text: &str) -> Vec<Rule> {
     rules
 }
 
+/// The sentence of a line such as `- Advice: this is so. {id}`.
+fn statement(line: &str, id: &str) -> String {
+    let Some(sentence) = line.strip_prefix("- ").and_then(|line| line.strip_suffix(&format!(" `{{{id}}}`")))
+    else {
+        panic!("a rule is an item of a list and ends with its name: {line}");
+    };
+    match sentence.strip_prefix("Advice: ") {
+        None => sentence.to_owned(),
+        Some(advice) => advice[..1].to_uppercase() + &advice[1..],
+    }
+}
+
 /// The index of rules at the end of the specification.
 pub(crate) fn index(text: &str) -> String {
     let mut rules = rules(text);
     rules.sort_by(|left, right| left.id.cmp(&right.id));
     let mut table = "| rule | breaking it is | section |\n|---|---|---|\n".to_owned();
-    for Rule { id, severity, section } in rules {
+    for Rule { id, severity, section, .. } in rules {
         let kind = match severity {
             "error" => "an error",
             "warning" => "a warning",
@@ -73,4 +91,31 @@ fn every_rule_is_stated_once() {
     for rule in &rules {
         assert!(seen.insert(&rule.id), "{} is stated twice", rule.id);
     }
+}
+
+#[test]
+fn the_code_has_the_rules_of_the_text_word_for_word() {
+    let stated = rules(&read_spec("open-structure.md"));
+    let ids = |ids: &mut dyn Iterator<Item = String>| ids.collect::<BTreeSet<_>>();
+    assert_eq!(
+        ids(&mut RULES.iter().map(|rule| rule.id.to_owned())),
+        ids(&mut stated.iter().map(|rule| rule.id.clone()))
+    );
+    for rule in &stated {
+        let code = RULES.iter().find(|code| code.id == rule.id).unwrap();
+        assert_eq!(code.severity.name(), rule.severity, "{}", rule.id);
+        assert_eq!(code.section, rule.section, "{}", rule.id);
+        assert_eq!(code.statement, rule.statement, "{}", rule.id);
+    }
+}
+
+#[test]
+fn the_conformance_corpus_has_a_folder_for_every_rule() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/conformance/invalid");
+    let found: BTreeSet<String> = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    let stated = rules(&read_spec("open-structure.md"));
+    assert_eq!(found, stated.into_iter().map(|rule| rule.id).collect());
 }

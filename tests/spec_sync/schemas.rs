@@ -32,6 +32,11 @@ fn json_schemas_are_those_of_the_code() {
 }
 
 #[test]
+fn the_report_of_the_validator_has_its_schema() {
+    sync(&file("validation_report"), &open_structure::validate::report_schema());
+}
+
+#[test]
 fn no_other_schema_lies_there() {
     if std::env::var_os("UPDATE_SPEC").is_some() {
         // Other tests are writing them.
@@ -41,10 +46,11 @@ fn no_other_schema_lies_there() {
     let found: BTreeSet<String> = fs::read_dir(folder)
         .unwrap()
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-        .filter(|name| !name.starts_with("report"))
         .collect();
-    let expected =
-        names().into_iter().map(|name| format!("{name}.schema.json")).chain(["arrow.json".to_owned()]);
+    let expected = names()
+        .into_iter()
+        .map(|name| format!("{name}.schema.json"))
+        .chain(["arrow.json".to_owned(), file("validation_report").replace("schemas/", "")]);
     assert_eq!(found, expected.collect());
 }
 
@@ -233,25 +239,15 @@ fn an_mcap_file_carries_the_very_same_schemas() {
         let schema = channel.schema.as_ref().unwrap();
         let name = channel.topic.strip_prefix('/').unwrap();
         topics.insert(name.to_owned());
-        match table_info(name) {
-            Some(table) => {
-                assert_eq!((channel.message_encoding.as_str(), schema.encoding.as_str()), ("arrow", "arrow"));
-                assert_eq!(schema.name, format!("open_structure.{}", table.record));
-                let found = arrow::ipc::convert::try_schema_from_ipc_buffer(&schema.data).unwrap();
-                assert_eq!(Arc::new(found), arrow_schema(table));
-            }
-            None => {
-                assert_eq!(
-                    (channel.message_encoding.as_str(), schema.encoding.as_str()),
-                    ("json", "jsonschema")
-                );
-                assert_eq!(schema.name, format!("open_structure.{name}"));
-                assert_eq!(
-                    String::from_utf8(schema.data.to_vec()).unwrap(),
-                    read_spec(&file(name)),
-                    "{name}"
-                );
-            }
+        if let Some(table) = table_info(name) {
+            assert_eq!((channel.message_encoding.as_str(), schema.encoding.as_str()), ("arrow", "arrow"));
+            assert_eq!(schema.name, format!("open_structure.{}", table.record));
+            let found = arrow::ipc::convert::try_schema_from_ipc_buffer(&schema.data).unwrap();
+            assert_eq!(Arc::new(found), arrow_schema(table));
+        } else {
+            assert_eq!((channel.message_encoding.as_str(), schema.encoding.as_str()), ("json", "jsonschema"));
+            assert_eq!(schema.name, format!("open_structure.{name}"));
+            assert_eq!(String::from_utf8(schema.data.to_vec()).unwrap(), read_spec(&file(name)), "{name}");
         }
     }
     assert_eq!(topics, names().into_iter().map(str::to_owned).collect());

@@ -162,7 +162,11 @@ fn compare(case: &Case, stored: Stored, found: &Reported) -> Result<(), String> 
         })
         .map(|(rule, _, table)| format!("{rule} {} is reported", text(table.as_deref())));
     let wrong: Vec<String> = missing.chain(surplus).collect();
-    if wrong.is_empty() { Ok(()) } else { Err(wrong.join("; ")) }
+    if wrong.is_empty() {
+        return Ok(());
+    }
+    let all: BTreeSet<&str> = found.iter().map(|found| found.0.as_str()).collect();
+    Err(format!("{}; reported in all: {all:?}", wrong.join("; ")))
 }
 
 fn text(table: Option<&str>) -> String {

@@ -1,7 +1,7 @@
 //! The program `os-convert`: raw datasets to sequences.
 
 use clap::Parser;
-use open_structure_converters::command::{Outcome, open_structure};
+use open_structure_converters::command::{Outcome, text_release};
 use std::io::{self, Write as _};
 use std::process::ExitCode;
 
@@ -15,20 +15,20 @@ struct Cli {
 
 #[derive(Debug, clap::Subcommand)]
 enum Command {
-    OpenStructure(open_structure::Args),
+    OpenStructure(text_release::Args),
 }
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
     // Without a handler an interrupted program merely leaves a temporary file behind.
     let _ = ctrlc::set_handler(|| {
-        ::open_structure::format::discard_unfinished();
+        open_structure::format::discard_unfinished();
         std::process::exit(130);
     });
     let mut stdout = io::stdout().lock();
     let mut stderr = io::stderr();
     let result = match &cli.command {
-        Command::OpenStructure(args) => open_structure::run(args, &mut stdout, &mut stderr),
+        Command::OpenStructure(args) => text_release::run(args, &mut stdout, &mut stderr),
     };
     let outcome = result.unwrap_or_else(|error| {
         // Where even stderr is closed there is nobody to tell.

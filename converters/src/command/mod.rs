@@ -1,8 +1,8 @@
 //! Commands of `os-convert`: arguments, calls, rendering.
 
-pub mod open_structure;
 mod progress;
 mod summary;
+pub mod text_release;
 
 /// How a command ended; `main` makes the exit code of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

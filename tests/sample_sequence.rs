@@ -162,7 +162,7 @@ fn segment_lines(tag: &str, lines: &[Line]) -> String {
 /// Rows of every frame, noise-free or with noise, and the groups.
 fn rows(scene: &Scene, poses: &[Pose], mut noise: Option<&mut Random>) -> String {
     let mut text = String::new();
-    let mut pixel_noise =
+    let pixel_noise =
         |noise: &mut Option<&mut Random>| noise.as_mut().map_or(0.0, |random| random.normal()) * SIGMA_PX;
     for (id, point) in &scene.points {
         for (frame, pose) in poses.iter().enumerate() {

@@ -2,7 +2,7 @@
 
 use crate::family::Choice;
 use crate::release::{Converted, Findings};
-use comfy_table::{CellAlignment, ContentArrangement, Table, presets::UTF8_HORIZONTAL_ONLY};
+use comfy_table::{CellAlignment, ContentArrangement, Table, presets::NOTHING};
 use open_structure::format::Encoding;
 use open_structure::structure::{Exclusion, Noise, Recovery};
 use serde::Serialize;
@@ -140,7 +140,7 @@ fn significant(value: f64) -> String {
 /// The table, the remarks, and what was left out, for people.
 pub(super) fn render(report: &Report) -> String {
     let mut table = Table::new();
-    table.load_style(UTF8_HORIZONTAL_ONLY).set_content_arrangement(ContentArrangement::Dynamic);
+    table.load_style(NOTHING).set_content_arrangement(ContentArrangement::Dynamic);
     table.set_header([
         "sequence",
         "frames",

@@ -48,7 +48,7 @@ impl Progress {
 
 impl Drop for Progress {
     fn drop(&mut self) {
-        if let Ok(Some(bar)) = self.bar.get_mut().map(|bar| bar.take()) {
+        if let Ok(Some(bar)) = self.bar.get_mut().map(Option::take) {
             bar.finish_and_clear();
         }
     }

@@ -221,10 +221,10 @@ impl McapSurvey {
             Record::MessageIndex(index) => tally.message_index_entries += index.records.len() as u64,
             Record::ChunkIndex(_) => tally.indexed_chunks += 1,
             Record::Statistics(statistics) => tally.statistics = Some(statistics),
-            Record::Metadata(metadata) if metadata.name == names::IDENTITY => {
-                if self.identities.len() < KEPT_MESSAGES {
-                    self.identities.push(metadata.metadata);
-                }
+            Record::Metadata(metadata)
+                if metadata.name == names::IDENTITY && self.identities.len() < KEPT_MESSAGES =>
+            {
+                self.identities.push(metadata.metadata);
             }
             Record::DataEnd(_) => tally.in_summary = true,
             Record::Footer(footer) => {

@@ -362,7 +362,7 @@ impl SequenceReader {
             }
             Backend::Parquet(tables) => FrameSource::Parquet(Box::new(Cursors::new(tables)?)),
         };
-        Ok(Frames { frames, source, failed: false })
+        Ok(Frames { waiting: frames, source, failed: false })
     }
 
     /// Reads the container through and checks its checksums; Parquet folders have theirs in the manifest.
@@ -579,7 +579,7 @@ enum FrameSource<'a> {
 
 /// Frames in order, each with its rows.
 pub struct Frames<'a> {
-    frames: VecDeque<&'a Frame>,
+    waiting: VecDeque<&'a Frame>,
     source: FrameSource<'a>,
     failed: bool,
 }
@@ -662,13 +662,13 @@ impl Iterator for Frames<'_> {
         if self.failed {
             return None;
         }
-        let frame = self.frames.pop_front()?;
+        let frame = self.waiting.pop_front()?;
         let result = self.bundle(frame);
         self.failed = result.is_err();
         Some(result)
     }
 
     fn size_hint(&self) -> (usize, Option<usize>) {
-        (self.frames.len(), Some(self.frames.len()))
+        (self.waiting.len(), Some(self.waiting.len()))
     }
 }

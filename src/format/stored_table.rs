@@ -36,7 +36,7 @@ impl StoredTable {
                 Err(_) => missing_columns.push(field.name),
                 Ok(found) if matches_type(found.data_type(), &data_type(field.kind)) => {}
                 Ok(found) => {
-                    mistyped_columns.push((field.name, found.data_type().to_string(), field.kind.name()))
+                    mistyped_columns.push((field.name, found.data_type().to_string(), field.kind.name()));
                 }
             }
         }

@@ -64,7 +64,7 @@ pub(crate) fn map_points(
     findings: &mut Findings,
 ) -> Outcome {
     check::<MapPoint>(shared, findings, |batch, _, _, _| {
-        remember(names, batch.iter().map(|row| &row.estimate))
+        remember(names, batch.iter().map(|row| &row.estimate));
     })
 }
 
@@ -75,7 +75,7 @@ pub(crate) fn map_lines(
     findings: &mut Findings,
 ) -> Outcome {
     check::<MapLine>(shared, findings, |batch, _, _, _| {
-        remember(names, batch.iter().map(|row| &row.estimate))
+        remember(names, batch.iter().map(|row| &row.estimate));
     })
 }
 

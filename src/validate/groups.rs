@@ -56,8 +56,9 @@ fn members(
     if group.line_ids.is_empty() {
         broken("at least one line", "none".to_owned());
     }
-    if let Some(pair) = group.line_ids.windows(2).find(|pair| pair[0] >= pair[1]) {
-        broken("lines ascending without repetition", format!("{} before {}", pair[0], pair[1]));
+    let neighbours = group.line_ids.iter().zip(group.line_ids.iter().skip(1));
+    if let Some((line, next)) = neighbours.into_iter().find(|(line, next)| line >= next) {
+        broken("lines ascending without repetition", format!("{line} before {next}"));
     }
     let own: BTreeSet<LineId> = group.line_ids.iter().copied().collect();
     for line in own {

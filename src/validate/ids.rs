@@ -24,13 +24,13 @@ impl IdIndex {
             _ => None,
         };
         let mut dense = Vec::new();
-        if let Some(span) = span.filter(|span| *span < ids.len().saturating_mul(8).saturating_add(1024)) {
-            if u32::try_from(ids.len()).is_ok_and(|count| count < u32::MAX) {
-                dense = vec![0; span + 1];
-                for (place, id) in (1_u32..).zip(&ids) {
-                    if let Ok(offset) = usize::try_from(id - ids[0]) {
-                        dense[offset] = place;
-                    }
+        if let Some(span) = span.filter(|span| *span < ids.len().saturating_mul(8).saturating_add(1024))
+            && u32::try_from(ids.len()).is_ok_and(|count| count < u32::MAX)
+        {
+            dense = vec![0; span + 1];
+            for (place, id) in (1_u32..).zip(&ids) {
+                if let Ok(offset) = usize::try_from(id - ids[0]) {
+                    dense[offset] = place;
                 }
             }
         }

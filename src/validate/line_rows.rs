@@ -109,7 +109,14 @@ impl<'a> LineImage<'a> {
         let image = line_matrix * moment;
         let scale = image.x.hypot(image.y);
         let rounding = 1e-12 * (image.z.abs() + 1.0);
-        (scale > rounding && scale.is_finite()).then(|| Self { line, pose, view, line_matrix, image, scale })
+        (scale > rounding && scale.is_finite()).then_some(Self {
+            line,
+            pose,
+            view,
+            line_matrix,
+            image,
+            scale,
+        })
     }
 
     /// Signed distance of a pixel, pixels, and its derivative by the four directions.

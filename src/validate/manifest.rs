@@ -211,10 +211,10 @@ fn cameras(cameras: &[Camera], findings: &mut Findings) -> Vec<Option<View>> {
                     broken(&format!("{name} over 0 m"), format!("{depth} m"));
                 }
             }
-            if let (Some(min), Some(max)) = (camera.depth_min, camera.depth_max) {
-                if min > max {
-                    broken("depth_min of at most depth_max", format!("{min} m and {max} m"));
-                }
+            if let (Some(min), Some(max)) = (camera.depth_min, camera.depth_max)
+                && min > max
+            {
+                broken("depth_min of at most depth_max", format!("{min} m and {max} m"));
             }
             closed("camera model", &camera.model, &id.to_string(), findings);
             closed("pixel origin", &camera.pixel_origin, &id.to_string(), findings);

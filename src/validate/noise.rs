@@ -128,7 +128,7 @@ impl Sample {
     /// Takes a row in, or passes over it.
     #[inline]
     pub(crate) fn add(&mut self, residual: Residual) {
-        if self.seen % self.stride == 0 {
+        if self.seen.is_multiple_of(self.stride) {
             self.kept.push(residual);
             if self.kept.len() == KEPT {
                 let mut index = 0;
@@ -188,12 +188,12 @@ pub(crate) fn judge_pixels(
         let count = found.iter().map(|(_, found)| found.count).sum::<usize>();
         format!("sigma of {} ({count} residuals)", sigmas.join(", "))
     };
-    if let Some(sigma_px) = declared.sigma_px {
-        if !found.iter().all(|(_, found)| agrees(*found, sigma_px, LEAST_SIGMA_PX)) {
-            findings.add(RuleId::NoiseAgrees, Some(table), || {
-                Detail::new(format!("the declared sigma of {sigma_px} px"), words())
-            });
-        }
+    if let Some(sigma_px) = declared.sigma_px
+        && !found.iter().all(|(_, found)| agrees(*found, sigma_px, LEAST_SIGMA_PX))
+    {
+        findings.add(RuleId::NoiseAgrees, Some(table), || {
+            Detail::new(format!("the declared sigma of {sigma_px} px"), words())
+        });
     }
     if found.iter().all(|(_, found)| found.sigma < LEAST_SIGMA_PX) {
         findings

@@ -93,10 +93,10 @@ pub(crate) fn check<R: Record>(
         if shared.summaries.is_some() {
             digest.update(rows);
         }
-        if let Some(log_time) = log_time.filter(|_| !rows.is_empty()) {
-            if outcome.log_times.len() < MOST_STAMPS || outcome.log_times.contains_key(&log_time) {
-                *outcome.log_times.entry(log_time).or_default() += 1;
-            }
+        if let Some(log_time) = log_time.filter(|_| !rows.is_empty())
+            && (outcome.log_times.len() < MOST_STAMPS || outcome.log_times.contains_key(&log_time))
+        {
+            *outcome.log_times.entry(log_time).or_default() += 1;
         }
         visit(rows, first_row, log_time, findings);
         outcome.rows += rows.len() as u64;

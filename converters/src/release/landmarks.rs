@@ -21,10 +21,10 @@ pub(super) fn points(rows: &[PointLine], file: &str, ledger: &mut Ledger) -> Poi
     for row in rows {
         if row.id < 0 {
             ledger.exclude(file, BAD_ID, Some(row.row));
-        } else if points.contains_key(&PointId(row.id)) {
-            ledger.exclude(file, AGAIN, Some(row.row));
+        } else if let std::collections::btree_map::Entry::Vacant(e) = points.entry(PointId(row.id)) {
+            e.insert(Point3::from(row.position));
         } else {
-            points.insert(PointId(row.id), Point3::from(row.position));
+            ledger.exclude(file, AGAIN, Some(row.row));
         }
     }
     points
@@ -36,11 +36,11 @@ pub(super) fn segments(rows: &[SegmentLine], file: &str, ledger: &mut Ledger) ->
     for row in rows {
         if row.id < 0 {
             ledger.exclude(file, BAD_ID, Some(row.row));
-        } else if segments.contains_key(&LineId(row.id)) {
-            ledger.exclude(file, AGAIN, Some(row.row));
-        } else {
+        } else if let std::collections::btree_map::Entry::Vacant(e) = segments.entry(LineId(row.id)) {
             let segment = Segment { start: Point3::from(row.start), end: Point3::from(row.end) };
-            segments.insert(LineId(row.id), segment);
+            e.insert(segment);
+        } else {
+            ledger.exclude(file, AGAIN, Some(row.row));
         }
     }
     segments

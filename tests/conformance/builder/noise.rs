@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-/// SplitMix64, by its published constants, with normal deviates after Box and Muller.
+/// `SplitMix64`, by its published constants, with normal deviates after Box and Muller.
 pub(crate) struct Noise {
     state: u64,
 }

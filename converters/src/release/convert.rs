@@ -16,7 +16,7 @@ use super::recover::{
 use super::residual::{DepthMiss, by_line, by_point, line_depths, line_distances, line_views};
 use super::rows::{Rows, line_observation, point_observation};
 use crate::family::{Choice, Clues, Sight, choose, sight};
-use crate::text_release::{PoseFile, TextSequence};
+use crate::text_release::TextSequence;
 use open_structure::geometry::{PinholeCamera, PluckerLine};
 use open_structure::structure::{
     CameraId, Frame, FrameId, LineId, LineLandmark, PointLandmark, Recovery, Sequence, frame_statistics,
@@ -100,7 +100,12 @@ pub fn convert(text: &TextSequence, options: &Options) -> Result<Converted, Erro
     let same_lines = association.lines == graph.lines;
     let directions = plucker(&lines);
     let judge = |rows: Rows| judged(rows, &truth, &camera, &points, &directions);
-    let (association, graph) = (judge(association), judge(graph));
+    let association = judge(association);
+    let graph = if same_points && same_lines {
+        Judged { rows: graph, fits: association.fits.clone(), ..association }
+    } else {
+        judge(graph)
+    };
     let point_tables =
         assign(verdict(association.points.as_ref()), verdict(graph.points.as_ref()), same_points);
     let line_tables = assign(verdict(association.lines.as_ref()), verdict(graph.lines.as_ref()), same_lines);
@@ -211,12 +216,9 @@ pub fn convert(text: &TextSequence, options: &Options) -> Result<Converted, Erro
 /// The true poses: of the file with all digits, or of one that prints them again.
 fn true_poses(text: &TextSequence, ledger: &mut Ledger) -> Poses {
     let repeated = || text.repeated_ground_truth.iter();
-    let most = |files: &mut dyn Iterator<Item = &PoseFile>| -> Option<usize> {
-        files.map(|file| file.poses.len()).max()
-    };
     let first = text.ground_truth.as_ref().or_else(|| {
-        let most = most(&mut repeated())?;
-        repeated().find(|file| file.poses.len() == most)
+        let most = repeated().map(|file| file.poses.len()).max();
+        repeated().find(|file| Some(file.poses.len()) == most)
     });
     let Some(first) = first else { return Poses::new() };
     let mut truth = poses(&first.poses, &first.file, ledger);

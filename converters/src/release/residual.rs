@@ -10,8 +10,8 @@ use std::collections::BTreeMap;
 /// A median absolute deviation times this is the sigma of a Gaussian.
 const SIGMA_PER_MEDIAN: f64 = 1.482_602_218_505_602;
 
-/// Rows that a figure of point noise is taken from; its statistical error is then half a percent.
-const SAMPLED_ROWS: usize = 30_000;
+/// Rows that a figure of point noise is taken from; its statistical error is then one percent.
+const SAMPLED_ROWS: usize = 10_000;
 
 /// The spread of some residuals.
 #[derive(Clone, Copy, Debug, PartialEq)]

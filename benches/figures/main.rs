@@ -11,6 +11,7 @@ mod figure;
 mod reading;
 mod scale;
 mod size;
+mod validating;
 
 use std::process::ExitCode;
 
@@ -26,8 +27,12 @@ fn main() -> Result<ExitCode> {
     }
     let wanted: Vec<String> =
         std::env::args().skip(1).filter(|argument| !argument.starts_with('-')).collect();
-    let all: [(&str, Measure); 3] =
-        [("reading", reading::measure), ("size", size::measure), ("scale", scale::measure)];
+    let all: [(&str, Measure); 4] = [
+        ("reading", reading::measure),
+        ("size", size::measure),
+        ("validating", validating::measure),
+        ("scale", scale::measure),
+    ];
     let mut figures = Figures::default();
     for (name, measure) in all {
         if wanted.is_empty() || wanted.iter().any(|word| name.contains(word.as_str())) {

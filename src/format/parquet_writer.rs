@@ -27,6 +27,9 @@ use crate::structure::TableInfo;
 /// Rows of a row group: enough to compress, few enough to hold several of them.
 pub(super) const ROW_GROUP_ROWS: usize = 1 << 18;
 /// Rows of a data page: what is read, at least, to see one frame.
+///
+/// Pages are compressed each by itself. The published columns of office3, at zstd 6, over their zip:
+/// 0.82 with 2^12 rows, 0.77 with 2^13, 0.75 with 2^14, 0.73 with 2^15; larger ones make one frame dearer.
 const PAGE_ROWS: usize = 1 << 14;
 /// Room for a dictionary of a whole row group of floats, so that a chunk is encoded one way throughout.
 const DICTIONARY_BYTES: usize = ROW_GROUP_ROWS * 16;
@@ -60,6 +63,10 @@ impl Layout {
     }
 
     /// Level of zstd.
+    ///
+    /// The published columns of office3 over their zip, pages of 2^13 rows: 0.97 at level 1, 0.81 at 3,
+    /// 0.77 at 6, 0.77 at 9 and 12, which take 1.6 and 3.8 times as long as 6; all decompress alike. Split
+    /// bytes are either constant or noise: level 9 makes them 0.2 % smaller than level 1.
     fn level(self) -> Result<ZstdLevel, ParquetError> {
         ZstdLevel::try_new(match self {
             Self::ByteStreamSplit => 1,

@@ -112,6 +112,15 @@ fn schemas(survey: &McapSurvey, findings: &mut Findings) {
     }
 }
 
+/// Whether a topic's channel says that its schema and its messages are Arrow.
+pub(crate) fn says_arrow(survey: &McapSurvey, topic: &str) -> bool {
+    survey.channels.values().any(|channel| {
+        channel.topic == topic
+            && channel.message_encoding == "arrow"
+            && channel.schema.as_ref().is_some_and(|(encoding, _)| encoding == "arrow")
+    })
+}
+
 /// Checks the stamps of messages that belong to the whole sequence.
 pub(crate) fn message_times(
     survey: &McapSurvey,

@@ -17,7 +17,7 @@ const MAJOR: u64 = 1;
 /// What could be understood of a manifest.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Known {
-    /// Whether it is JSON.
+    /// Whether it is a JSON object.
     pub(crate) readable: bool,
     pub(crate) spec_version: Option<String>,
     pub(crate) name: Option<String>,
@@ -51,7 +51,7 @@ pub(crate) fn manifest(text: &[u8], findings: &mut Findings) -> Known {
 /// Checks a manifest, and understands of it what can be understood.
 pub(crate) fn manifest_value(value: &Value, findings: &mut Findings) -> Known {
     let known = Known {
-        readable: true,
+        readable: value.is_object(),
         spec_version: part(value, "spec_version"),
         name: part(value, "name"),
         cameras: part(value, "cameras"),
@@ -77,6 +77,7 @@ pub(crate) fn manifest_value(value: &Value, findings: &mut Findings) -> Known {
     }
     if let Some(source) = part::<Source>(value, "source") {
         documented(&source, findings);
+        open("dataset", Some(&source.dataset).filter(|dataset| !dataset.is_empty()), findings);
     }
     if let Some(noise) = &known.noise {
         open("noise model", [&noise.model], findings);
@@ -219,6 +220,7 @@ fn cameras(cameras: &[Camera], findings: &mut Findings) -> Vec<Option<View>> {
             closed("camera model", &camera.model, &id.to_string(), findings);
             closed("pixel origin", &camera.pixel_origin, &id.to_string(), findings);
             closed("camera axes", &camera.axes, &id.to_string(), findings);
+            open("removed distortion", camera.removed_distortion.as_ref().map(|lens| &lens.model), findings);
             axes(camera, findings);
             (usable && camera.model == registry::PINHOLE).then(|| View::new(camera))
         })

@@ -286,6 +286,9 @@ fn forget(
     if ["graph_poses", "graph_points", "graph_lines"].into_iter().any(unread) {
         findings.forget(RuleId::GraphVerticesKnown, |_| true);
     }
+    if unread(StructuralGroup::TABLE.name) {
+        findings.forget(RuleId::FrameStatisticsAgree, |_| true);
+    }
     let per_frame = [
         PointMeasurement::TABLE.name,
         PointObservation::TABLE.name,

@@ -60,9 +60,7 @@ fn unopened(path: &Path, error: &format::Error, mut subject: Subject, mut findin
         return Report::new(subject, BTreeMap::new(), findings);
     };
     subject.encoding = Some(Encoding::Mcap.name());
-    let text = survey.json.iter().find(|message| message.0 == "/manifest").map(|message| &message.2);
-    let known = text.map(|text| manifest(text, &mut findings)).unwrap_or_default();
-    container::survey(&survey, &known, &mut findings);
+    let known = surveyed(&survey, &mut findings);
     // Without an index its absence is the finding, else what the reader said.
     if survey.index.count == 0 && survey.unreadable.count == 0 {
         unreadable(&mut findings);
@@ -70,6 +68,14 @@ fn unopened(path: &Path, error: &format::Error, mut subject: Subject, mut findin
     subject.spec_version = known.spec_version;
     subject.sequence = known.name;
     Report::new(subject, BTreeMap::new(), findings)
+}
+
+/// Checks the manifest and the container by what a reading from end to end has shown.
+fn surveyed(survey: &McapSurvey, findings: &mut Findings) -> Known {
+    let text = survey.json.iter().find(|message| message.0 == "/manifest").map(|message| &message.2);
+    let known = text.map(|text| manifest(text, findings)).unwrap_or_default();
+    container::survey(survey, &known, findings);
+    known
 }
 
 fn opened(
@@ -95,6 +101,16 @@ fn opened(
             return Report::new(subject, BTreeMap::new(), findings);
         }
         Err(format::Error::NotASequence { found, .. }) => {
+            // What the index does not know may be there all the same; then nothing can be read by it.
+            let survey = reader.survey().filter(|survey| {
+                survey.index.count > 0 && survey.json.iter().any(|message| message.0 == "/manifest")
+            });
+            if let Some(survey) = survey {
+                let known = surveyed(&survey, &mut findings);
+                subject.spec_version = known.spec_version;
+                subject.sequence = known.name;
+                return Report::new(subject, BTreeMap::new(), findings);
+            }
             findings.add(RuleId::ManifestSchema, None, || Detail::new("a manifest", found));
             Known::default()
         }
@@ -156,6 +172,13 @@ fn opened(
         rayon::join(|| reader.survey(), || run(&shared, &known, findings.fresh()));
     if let Some(survey) = &survey {
         container::survey(survey, &known, &mut findings);
+        for (table, error) in damage {
+            if container::says_arrow(survey, &table.topic()) {
+                findings.add(RuleId::McapSchemasEmbedded, Some(table.name), || {
+                    Detail::new("an Arrow schema", error.to_string())
+                });
+            }
+        }
         if let Some(stamps) = tables.stamps {
             let per_frame = crate::structure::TABLES
                 .iter()

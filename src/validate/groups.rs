@@ -56,8 +56,8 @@ fn members(
     if group.line_ids.is_empty() {
         broken("at least one line", "none".to_owned());
     }
-    let neighbours = group.line_ids.iter().zip(group.line_ids.iter().skip(1));
-    if let Some((line, next)) = neighbours.into_iter().find(|(line, next)| line >= next) {
+    let mut neighbours = group.line_ids.iter().zip(group.line_ids.iter().skip(1));
+    if let Some((line, next)) = neighbours.find(|(line, next)| line >= next) {
         broken("lines ascending without repetition", format!("{line} before {next}"));
     }
     let own: BTreeSet<LineId> = group.line_ids.iter().copied().collect();

@@ -66,7 +66,7 @@ fn peak_memory() -> u64 {
 fn use_all(path: &Path) -> Result<(), Error> {
     let reader = format::open(path)?;
     let whole = reader.read_all().map(drop);
-    let frames = reader.frames().and_then(std::iter::Iterator::collect::<Result<Vec<_>, _>>);
+    let frames = reader.frames().and_then(Iterator::collect::<Result<Vec<_>, _>>);
     let alone = match reader.frame_list() {
         Ok(list) => {
             let ids: Vec<_> = list.iter().step_by(2).take(3).map(|frame| frame.frame_id).collect();

@@ -50,7 +50,7 @@ impl Detail {
         self
     }
 
-    pub(crate) fn id(mut self, id: impl ToString) -> Self {
+    pub(crate) fn id(mut self, id: impl std::fmt::Display) -> Self {
         self.id = Some(id.to_string());
         self
     }

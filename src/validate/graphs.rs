@@ -55,10 +55,14 @@ pub(crate) fn graphs(
     });
     unknown.report(RuleId::FrameKnown, "graph_poses", "frame", "frames", findings);
     let point_outcome = check::<GraphPoint>(shared, findings, |batch, _, _, _| {
-        batch.iter().for_each(|point| points.add(&point.graph, point.point_id.0));
+        for point in batch {
+            points.add(&point.graph, point.point_id.0);
+        }
     });
     let line_outcome = check::<GraphLine>(shared, findings, |batch, _, _, _| {
-        batch.iter().for_each(|line| lines.add(&line.graph, line.line_id.0));
+        for line in batch {
+            lines.add(&line.graph, line.line_id.0);
+        }
     });
     [&mut poses, &mut points, &mut lines].into_iter().for_each(Vertices::sort);
     let factor_outcome = check::<GraphFactor>(shared, findings, |batch, first_row, _, findings| {
@@ -204,7 +208,9 @@ fn is_positive(upper: &[f64], dimension: usize) -> bool {
     if largest == 0.0 {
         return true;
     }
-    matrix.iter_mut().for_each(|entry| *entry /= largest);
+    for entry in &mut matrix {
+        *entry /= largest;
+    }
     let mut left: Vec<usize> = (0..dimension).collect();
     while let Some(place) = (0..left.len())
         .max_by(|a, b| matrix[left[*a] * (dimension + 1)].total_cmp(&matrix[left[*b] * (dimension + 1)]))

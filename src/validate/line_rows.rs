@@ -200,7 +200,7 @@ pub(crate) fn lines<R: LineRow>(
             }
             let residuals = [start.0, end.0];
             // A segment without length says nothing of a line's direction, nor of its place along.
-            if ends[0].pixel != ends[1].pixel {
+            if !coincide(ends) {
                 fits[landmark].add(residuals, &[start.1, end.1]);
             }
             let landmark = u32::try_from(landmark).unwrap_or(u32::MAX);
@@ -224,6 +224,12 @@ pub(crate) fn lines<R: LineRow>(
     Seen { outcome, books, shown, fits, sample, astray }
 }
 
+/// Whether both ends are the same pixel, digit by digit.
+#[expect(clippy::float_cmp, reason = "ends that differ at all have a direction")]
+fn coincide([start, end]: [End; 2]) -> bool {
+    start.pixel[0] == end.pixel[0] && start.pixel[1] == end.pixel[1]
+}
+
 fn segment(
     ends: [End; 2],
     table: &'static str,
@@ -238,7 +244,7 @@ fn segment(
             Detail::new("a depth over 0 m", found).row(row).id(format!("line {line_id}"))
         });
     }
-    if ends[0].pixel == ends[1].pixel {
+    if coincide(ends) {
         findings.add(RuleId::SegmentPixelsDistinct, Some(table), || {
             let [u, v] = ends[0].pixel;
             let found = format!("both at ({u}, {v}) in frame {frame_id}");

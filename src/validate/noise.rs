@@ -166,7 +166,9 @@ pub(crate) fn robust_sigma(mut residuals: Vec<f64>) -> Option<Found> {
     if count < LEAST {
         return None;
     }
-    residuals.iter_mut().for_each(|residual| *residual = residual.abs());
+    for residual in &mut residuals {
+        *residual = residual.abs();
+    }
     let (_, median, _) = residuals.select_nth_unstable_by(count / 2, f64::total_cmp);
     let sigma = 1.4826 * *median;
     Some(Found { sigma, standard_error: ROBUST_ERROR * sigma / (count as f64).sqrt(), count })
@@ -240,7 +242,7 @@ mod tests {
     #[test]
     fn the_sample_is_even_and_bounded() {
         let mut sample = Sample::default();
-        for index in 0..(KEPT as u32 * 3) {
+        for index in 0..u32::try_from(KEPT * 3).unwrap() {
             sample.add(Residual { landmark: index, pixels: [0.0; 2], depths: [f64::NAN; 2] });
         }
         assert!(sample.kept.len() < KEPT);
@@ -256,7 +258,7 @@ mod tests {
         let (truth, alpha) = (3.2, 1.25);
         let measured = 0.01 * 35130.0 / (35130.0 / (100.0 * truth + alpha) + 0.5);
         assert!((depth.residual(measured, truth) - alpha).abs() < 1e-9);
-        assert_eq!(depth.sigma_m(), 0.015);
+        assert!((depth.sigma_m() - 0.015).abs() < 1e-15);
     }
 
     #[test]

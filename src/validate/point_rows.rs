@@ -208,8 +208,9 @@ impl Projection {
         [u, v]: [f64; 2],
         frame_id: i64,
     ) -> Option<(String, String)> {
-        let distance = residuals[0].hypot(residuals[1]);
-        if distance > REPROJECTION_PX {
+        let squared = residuals[0] * residuals[0] + residuals[1] * residuals[1];
+        if squared > REPROJECTION_PX * REPROJECTION_PX {
+            let distance = squared.sqrt();
             let [x, y] = self.pixel;
             let expected = format!("({x:.3}, {y:.3}) within 0.5 px in frame {frame_id}");
             return Some((expected, format!("({u:.3}, {v:.3}), {distance:.3} px away")));

@@ -71,110 +71,8 @@ pub(crate) fn run(shared: &Shared<'_>, known: &Known, mut findings: Findings) ->
         noise: Declared::new(known.noise.as_ref()),
     };
 
-    let statistics = shared.source.has::<FrameStatistics>();
-    let hashed_points = shared.source.has::<PointCorrespondence>();
-    let hashed_lines = shared.source.has::<LineCorrespondence>();
-    let blank = findings.fresh();
-    let ((measured_points, measured_lines), (observed_points, (observed_lines, (claims, others)))) =
-        rayon::join(
-            || {
-                rayon::join(
-                    || {
-                        apart(&blank, |found| {
-                            points::<PointMeasurement>(shared, &world, hashed_points, statistics, found)
-                        })
-                    },
-                    || {
-                        apart(&blank, |found| {
-                            lines::<LineMeasurement>(shared, &world, hashed_lines, statistics, found)
-                        })
-                    },
-                )
-            },
-            || {
-                rayon::join(
-                    || {
-                        apart(&blank, |found| {
-                            points::<PointObservation>(shared, &world, hashed_points, statistics, found)
-                        })
-                    },
-                    || {
-                        rayon::join(
-                            || {
-                                apart(&blank, |found| {
-                                    lines::<LineObservation>(shared, &world, hashed_lines, statistics, found)
-                                })
-                            },
-                            || {
-                                rayon::join(
-                                    || apart(&blank, |found| claims(shared, &index, found)),
-                                    || apart(&blank, |found| other_tables(shared, &index, &names, found)),
-                                )
-                            },
-                        )
-                    },
-                )
-            },
-        );
-    let mut take = |found: Findings| findings.merge(found);
-    let (mut measured_points, found) = measured_points;
-    take(found);
-    let (mut measured_lines, found) = measured_lines;
-    take(found);
-    let (mut observed_points, found) = observed_points;
-    take(found);
-    let (mut observed_lines, found) = observed_lines;
-    take(found);
-    let ((point_claims, line_claims), found) = claims;
-    take(found);
-    let ((names, other_outcomes), found) = others;
-    take(found);
-
-    hold_claims::<PointCorrespondence, 3>(
-        shared,
-        &point_claims,
-        [&measured_points, &observed_points],
-        &mut findings,
-    );
-    hold_claims::<LineCorrespondence, 4>(
-        shared,
-        &line_claims,
-        [&measured_lines, &observed_lines],
-        &mut findings,
-    );
-    if let Some(landmarks) = world.points {
-        judge(
-            &POINTS,
-            landmarks.index.ids(),
-            &mut observed_points,
-            &mut measured_points,
-            &world.noise,
-            &mut findings,
-        );
-    }
-    if let Some(landmarks) = world.lines {
-        judge(
-            &LINES,
-            landmarks.index.ids(),
-            &mut observed_lines,
-            &mut measured_lines,
-            &world.noise,
-            &mut findings,
-        );
-    }
-    let point_counts = counts(&measured_points, &observed_points);
-    let line_counts = counts(&measured_lines, &observed_lines);
-    let outcome = frame_statistics(shared, &index, point_counts, line_counts, &mut findings);
-    outcomes.insert(FrameStatistics::TABLE.name, outcome);
-
-    let (point_claims_outcome, line_claims_outcome) = (point_claims.1, line_claims.1);
-    outcomes.insert(PointCorrespondence::TABLE.name, point_claims_outcome);
-    outcomes.insert(LineCorrespondence::TABLE.name, line_claims_outcome);
-    outcomes.extend(other_outcomes);
-    outcomes.insert(PointMeasurement::TABLE.name, measured_points.outcome);
-    outcomes.insert(PointObservation::TABLE.name, observed_points.outcome);
-    outcomes.insert(LineMeasurement::TABLE.name, measured_lines.outcome);
-    outcomes.insert(LineObservation::TABLE.name, observed_lines.outcome);
+    let read = side_by_side(shared, &world, &names, &mut findings);
+    outcomes.extend(judge_together(shared, &world, read, &mut names, &mut findings));
 
     let measured = [PointMeasurement::TABLE.name, LineMeasurement::TABLE.name]
         .iter()
@@ -182,10 +80,8 @@ pub(crate) fn run(shared: &Shared<'_>, known: &Known, mut findings: Findings) ->
         .sum::<u64>();
     if measured > 0 && known.silent_on_noise {
         findings.add(RuleId::NoiseDeclared, None, || {
-            Detail::new(
-                "the noise of the measurements in the manifest",
-                format!("none, for {measured} measurements"),
-            )
+            let expected = "the noise of the measurements in the manifest";
+            Detail::new(expected, format!("none, for {measured} measurements"))
         });
     }
     open("estimate", &names.estimates, &mut findings);
@@ -193,6 +89,96 @@ pub(crate) fn run(shared: &Shared<'_>, known: &Known, mut findings: Findings) ->
     open("factor kind", &names.factor_kinds, &mut findings);
     forget(shared, frames_known, &outcomes, &mut findings);
     Tables { findings, outcomes, stamps: index.first_and_last_stamp.filter(|_| frames_known) }
+}
+
+/// What was read of the tables that do not wait for each other.
+struct Read {
+    measured_points: Seen<3>,
+    observed_points: Seen<3>,
+    measured_lines: Seen<4>,
+    observed_lines: Seen<4>,
+    point_claims: Claimed,
+    line_claims: Claimed,
+    names: Names,
+    others: Vec<(&'static str, Outcome)>,
+}
+
+/// Reads all tables but those that others refer to, on as many threads as there are.
+fn side_by_side(shared: &Shared<'_>, world: &World<'_>, names: &Names, findings: &mut Findings) -> Read {
+    let counted = shared.source.has::<FrameStatistics>();
+    let hashed_points = shared.source.has::<PointCorrespondence>();
+    let hashed_lines = shared.source.has::<LineCorrespondence>();
+    let blank = findings.fresh();
+    let measured_points =
+        || apart(&blank, |found| points::<PointMeasurement>(shared, world, hashed_points, counted, found));
+    let observed_points =
+        || apart(&blank, |found| points::<PointObservation>(shared, world, hashed_points, counted, found));
+    let measured_lines =
+        || apart(&blank, |found| lines::<LineMeasurement>(shared, world, hashed_lines, counted, found));
+    let observed_lines =
+        || apart(&blank, |found| lines::<LineObservation>(shared, world, hashed_lines, counted, found));
+    let claims = || apart(&blank, |found| claims(shared, world.frames, found));
+    let others = || apart(&blank, |found| other_tables(shared, world.frames, names, found));
+    let ((measured_points, measured_lines), ((observed_points, observed_lines), (claims, others))) =
+        rayon::join(
+            || rayon::join(measured_points, measured_lines),
+            || rayon::join(|| rayon::join(observed_points, observed_lines), || rayon::join(claims, others)),
+        );
+    // In one order, whichever was ready first.
+    for found in
+        [measured_points.1, measured_lines.1, observed_points.1, observed_lines.1, claims.1, others.1]
+    {
+        findings.merge(found);
+    }
+    let ((point_claims, line_claims), (names, others)) = (claims.0, others.0);
+    Read {
+        measured_points: measured_points.0,
+        observed_points: observed_points.0,
+        measured_lines: measured_lines.0,
+        observed_lines: observed_lines.0,
+        point_claims,
+        line_claims,
+        names,
+        others,
+    }
+}
+
+/// Judges what only several tables together show; gives the outcomes of the tables read.
+fn judge_together(
+    shared: &Shared<'_>,
+    world: &World<'_>,
+    read: Read,
+    names: &mut Names,
+    findings: &mut Findings,
+) -> Vec<(&'static str, Outcome)> {
+    let Read { mut measured_points, mut observed_points, mut measured_lines, mut observed_lines, .. } = read;
+    let seen = [&measured_points, &observed_points];
+    hold_claims::<PointCorrespondence, 3>(shared, &read.point_claims, seen, findings);
+    let seen = [&measured_lines, &observed_lines];
+    hold_claims::<LineCorrespondence, 4>(shared, &read.line_claims, seen, findings);
+    if let Some(known) = world.points {
+        let ids = known.index.ids();
+        judge(&POINTS, ids, &mut observed_points, &mut measured_points, &world.noise, findings);
+    }
+    if let Some(known) = world.lines {
+        let ids = known.index.ids();
+        judge(&LINES, ids, &mut observed_lines, &mut measured_lines, &world.noise, findings);
+    }
+    let point_counts = counts(&measured_points, &observed_points);
+    let line_counts = counts(&measured_lines, &observed_lines);
+    let statistics = frame_statistics(shared, world.frames, point_counts, line_counts, findings);
+    *names = read.names;
+    let mut outcomes = read.others;
+    outcomes.extend([
+        (FrameStatistics::TABLE.name, statistics),
+        (PointCorrespondence::TABLE.name, read.point_claims.1),
+        (LineCorrespondence::TABLE.name, read.line_claims.1),
+        (PointMeasurement::TABLE.name, measured_points.outcome),
+        (PointObservation::TABLE.name, observed_points.outcome),
+        (LineMeasurement::TABLE.name, measured_lines.outcome),
+        (LineObservation::TABLE.name, observed_lines.outcome),
+    ]);
+    outcomes
 }
 
 /// Does work with findings of its own.

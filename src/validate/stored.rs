@@ -13,7 +13,7 @@ use super::source::Source;
 use super::tables::{Progress, Shared, damaged};
 use super::{Error, Options, container};
 use crate::format::{self, Encoding, McapSurvey, SequenceReader, survey_file};
-use crate::structure::{Sequence, TableSummary, for_each_table};
+use crate::structure::{Sequence, Storage, TABLES, TableInfo, TableSummary, for_each_table};
 
 /// Validates what stands at a path.
 pub(crate) fn validate(path: &Path, options: &Options<'_>) -> Result<Report, Error> {
@@ -38,7 +38,7 @@ pub(crate) fn validate(path: &Path, options: &Options<'_>) -> Result<Report, Err
         return Ok(Report::new(subject, BTreeMap::new(), findings));
     }
     Ok(match SequenceReader::open_lenient(target) {
-        Ok((reader, damage)) => opened(&reader, damage, subject, options, findings),
+        Ok((reader, damage)) => opened(&reader, &damage, subject, options, findings),
         Err(format::Error::Io { cause, .. }) => return Err(io(cause)),
         Err(error) => unopened(target, &error, subject, findings),
     })
@@ -80,7 +80,7 @@ fn surveyed(survey: &McapSurvey, findings: &mut Findings) -> Known {
 
 fn opened(
     reader: &SequenceReader,
-    damage: Vec<(&'static crate::structure::TableInfo, format::Error)>,
+    damage: &[(&'static TableInfo, format::Error)],
     mut subject: Subject,
     options: &Options<'_>,
     mut findings: Findings,
@@ -127,7 +127,7 @@ fn opened(
         return Report::new(subject, BTreeMap::new(), findings);
     }
 
-    for (table, error) in &damage {
+    for (table, error) in damage {
         // A channel without its schema is the survey's finding.
         if !is_mcap {
             damaged(error, table.name, &mut findings);
@@ -180,9 +180,9 @@ fn opened(
             }
         }
         if let Some(stamps) = tables.stamps {
-            let per_frame = crate::structure::TABLES
+            let per_frame = TABLES
                 .iter()
-                .filter(|table| table.storage == crate::structure::Storage::PerFrame)
+                .filter(|table| table.storage == Storage::PerFrame)
                 .map(|table| table.name)
                 .collect::<Vec<_>>();
             container::message_times(survey, &tables.outcomes, &per_frame, stamps, &mut findings);

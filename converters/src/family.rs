@@ -356,14 +356,13 @@ mod tests {
     #[test]
     fn a_wider_image_is_told_by_its_rows() {
         let narrow = sights(&FAMILIES[0].camera());
-        let mut pixels = pixels(&narrow);
         let chosen = |pixels: &[Point2<f64>]| {
             choose(&Clues { name: "", sights: &narrow, pixels, coarse_poses: false, given: None })
         };
+        let mut pixels = pixels(&narrow);
         assert_eq!(chosen(&pixels).camera.width, 640);
         pixels.push(Point2::new(700.0, 100.0));
-        let choice = chosen(&pixels);
-        assert_eq!((choice.camera.width, choice.beyond_image), (752, 0));
+        assert_eq!((chosen(&pixels).camera.width, chosen(&pixels).beyond_image), (752, 0));
         pixels.push(Point2::new(7000.0, 100.0));
         assert_eq!(chosen(&pixels).beyond_image, 1);
     }

@@ -1,5 +1,5 @@
 //! A small text release, made here, goes all the way: both archives, both encodings, every decision.
-#![expect(clippy::unwrap_used, reason = "tests")]
+#![expect(clippy::unwrap_used, clippy::float_cmp, clippy::format_push_string, reason = "tests")]
 
 mod scene;
 

@@ -174,18 +174,19 @@ pub(super) fn render(report: &Report) -> String {
             column.set_cell_alignment(CellAlignment::Right);
         }
     }
-    let mut text = if report.sequences.is_empty() { String::new() } else { format!("{table}\n") };
+    let mut lines = Vec::new();
+    if !report.sequences.is_empty() {
+        lines.push(table.to_string());
+    }
     for summary in &report.sequences {
         for Exclusion { file, reason, count, first_line } in &summary.excluded {
             let at = first_line.map_or_else(String::new, |line| format!(":{line}"));
-            text += &format!("{}: excluded {count}: {file}{at}: {reason}\n", summary.sequence);
+            lines.push(format!("{}: excluded {count}: {file}{at}: {reason}", summary.sequence));
         }
         for note in &summary.notes {
-            text += &format!("{}: note: {note}\n", summary.sequence);
+            lines.push(format!("{}: note: {note}", summary.sequence));
         }
     }
-    for passed in &report.passed_over {
-        text += &format!("passed over: {passed}\n");
-    }
-    text
+    lines.extend(report.passed_over.iter().map(|passed| format!("passed over: {passed}")));
+    lines.into_iter().map(|line| line + "\n").collect()
 }

@@ -1,37 +1,28 @@
 //! The conversion of one sequence, step by step.
 
-use super::decide::{Assignment, Judgement, Origin, Verdict, assign, judge_lines, judge_points};
+use super::decide::{Assignment, Judgement, Origin, assign};
 use super::describe::{Findings, manifest};
 use super::estimates::{Estimates, Known, add_estimates, estimates, frames as estimate_frames};
 use super::graph::{Vertices, add_graph};
 use super::groups::groups;
-use super::landmarks::{Points, Segments, line_landmarks, point_landmarks};
+use super::judged::{Judged, depth_misses, judged, plucker, sights, verdict};
+use super::landmarks::{line_landmarks, point_landmarks};
 use super::ledger::Ledger;
-use super::line_fit::{Fits, fit_lines};
 use super::noise::FoundNoise;
-use super::poses::{Poses, is_coarse, largest_angle, largest_distance, poses};
-use super::recover::{
-    count_unfit, recover_depths, recover_line_landmarks, recover_points, recover_unrefined,
-};
-use super::residual::{DepthMiss, by_line, by_point, line_depths, line_distances, line_views};
-use super::rows::{Rows, line_observation, point_observation};
-use crate::family::{Choice, Clues, Sight, choose, sight};
+use super::poses::{Poses, is_coarse, true_poses};
+use super::remarks::remark;
+use super::rows::Rows;
+use super::tables::{Scene, add_lines, add_points};
+use crate::family::{Clues, choose};
 use crate::text_release::TextSequence;
-use open_structure::geometry::{PinholeCamera, PluckerLine};
+use open_structure::geometry::PinholeCamera;
 use open_structure::structure::{
-    CameraId, Frame, FrameId, LineId, LineLandmark, PointLandmark, Recovery, Sequence, frame_statistics,
-    line_correspondences, point_correspondences, registry,
+    CameraId, Frame, FrameId, Sequence, frame_statistics, line_correspondences, point_correspondences,
 };
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 /// Frame rate of the clock that is made for the release, which has no time stamps; hertz.
 pub(super) const RATE_HZ: i64 = 30;
-
-/// Rows by which a family is chosen.
-const SAMPLED_SIGHTS: usize = 4000;
-
-/// Ground truth that is printed again may differ by its rounding, metres and radians.
-const REPEATED_TRUTH: f64 = 2e-3;
 
 /// How a sequence is converted.
 #[derive(Clone, Copy, Debug, Default)]
@@ -61,14 +52,6 @@ pub enum Error {
     },
 }
 
-/// The rows of one file with what was found about them.
-struct Judged {
-    rows: Rows,
-    fits: Fits,
-    points: Option<Judgement>,
-    lines: Option<Judgement>,
-}
-
 /// Converts one sequence.
 ///
 /// # Errors
@@ -89,7 +72,7 @@ pub fn convert(text: &TextSequence, options: &Options) -> Result<Converted, Erro
 
     let choice = choose(&Clues {
         name: &text.name,
-        sights: &sights(&association, &graph, &truth, &points, &vertices),
+        sights: &sights(&association, &graph, &known),
         pixels: &association.pixels().chain(graph.pixels()).collect::<Vec<_>>(),
         coarse_poses: is_coarse(&truth),
         given: options.camera,
@@ -118,52 +101,22 @@ pub fn convert(text: &TextSequence, options: &Options) -> Result<Converted, Erro
     }
 
     let mut sequence = Sequence::default();
-    let mut recovered: Vec<Recovery> = Vec::new();
-
-    if let Some(origin) = point_tables.observations {
-        let rows = &of(origin).rows;
-        sequence.point_observations = rows.points.iter().map(point_observation).collect();
-        recovered.extend(recover_depths(&mut sequence.point_observations, &truth, &camera, &points));
-    }
-    if let Some(origin) = point_tables.measurements {
-        sequence.point_measurements.clone_from(&of(origin).rows.points);
-    }
-    if let Some(origin) = line_tables.observations {
-        sequence.line_observations = of(origin).rows.lines.iter().map(line_observation).collect();
-    }
-    if let Some(origin) = line_tables.measurements {
-        sequence.line_measurements.clone_from(&of(origin).rows.lines);
-    }
-
-    sequence.point_landmarks = points.iter().map(|(id, at)| PointLandmark::new(*id, *at)).collect();
-    if let Some(origin) = point_tables.observations {
-        let rows = &of(origin).rows;
-        let (found, recovery) =
-            recover_points(&by_point(&rows.points), &points, &truth, &camera, &rows.file, &mut ledger);
-        sequence.point_landmarks.extend(found);
-        recovered.extend(recovery);
-    }
-    sequence.line_landmarks =
-        lines.iter().filter_map(|(id, segment)| LineLandmark::from_segment(*id, segment).ok()).collect();
-    // Lines are fitted to rows without noise where there are any.
-    if let Some(origin) = line_tables.observations.or(line_tables.measurements) {
-        let Judged { rows, fits, lines: judgement, .. } = of(origin);
-        let exact = line_tables.observations.is_some();
-        if exact {
-            let (found, recovery) = recover_line_landmarks(fits, &lines);
-            sequence.line_landmarks.extend(found);
-            recovered.extend(recovery);
-            count_unfit(fits, |id| !lines.contains_key(id), &rows.file, &mut ledger);
-        }
-        let sigma_px = judgement.and_then(|judgement| judgement.own).map_or(1.0, |own| own.sigma);
-        let tracks = by_line(&rows.lines);
-        let (found, recovery) = recover_unrefined(&tracks, fits, &lines, &truth, &camera, sigma_px);
-        if recovery.is_some() {
-            count_unfit(fits, |id| lines.contains_key(id), &rows.file, &mut ledger);
-        }
-        sequence.map_lines.extend(found);
-        recovered.extend(recovery);
-    }
+    let scene = Scene { truth: &truth, camera: &camera, points: &points, lines: &lines };
+    let from_points = |origin: Option<Origin>| origin.map(|origin| &of(origin).rows);
+    let mut recovered = add_points(
+        from_points(point_tables.observations),
+        from_points(point_tables.measurements),
+        &scene,
+        &mut sequence,
+        &mut ledger,
+    );
+    recovered.extend(add_lines(
+        line_tables.observations.map(of),
+        line_tables.measurements.map(of),
+        &scene,
+        &mut sequence,
+        &mut ledger,
+    ));
     sequence.sort();
 
     sequence.structural_groups =
@@ -195,7 +148,7 @@ pub fn convert(text: &TextSequence, options: &Options) -> Result<Converted, Erro
         judgement(line_tables, |judged| judged.lines.as_ref()),
         depths.as_deref().unwrap_or_default(),
     );
-    remark(text, &choice, [point_tables, line_tables], &truth, &sequence, &results, &vertices, &mut ledger);
+    remark(text, &choice, [point_tables, line_tables], &sequence, &mut ledger);
 
     let (excluded, notes) = ledger.finish();
     let findings = Findings {
@@ -211,93 +164,6 @@ pub fn convert(text: &TextSequence, options: &Options) -> Result<Converted, Erro
     };
     sequence.manifest = manifest(text, &sequence, &findings, options);
     Ok(Converted { sequence, findings })
-}
-
-/// The true poses: of the file with all digits, or of one that prints them again.
-fn true_poses(text: &TextSequence, ledger: &mut Ledger) -> Poses {
-    let repeated = || text.repeated_ground_truth.iter();
-    let first = text.ground_truth.as_ref().or_else(|| {
-        let most = repeated().map(|file| file.poses.len()).max();
-        repeated().find(|file| Some(file.poses.len()) == most)
-    });
-    let Some(first) = first else { return Poses::new() };
-    let mut truth = poses(&first.poses, &first.file, ledger);
-    for file in repeated().filter(|file| file.file != first.file) {
-        let again = poses(&file.poses, &file.file, ledger);
-        let (distance, _) = largest_distance(&truth, &again);
-        let angle = largest_angle(&truth, &again);
-        if distance > REPEATED_TRUTH || angle > REPEATED_TRUTH {
-            let reason = format!(
-                "ground truth differs from {} by up to {distance:.4} m, {angle:.4} rad; the latter is kept",
-                first.file
-            );
-            ledger.exclude_many(&file.file, &reason, again.len() as u64, None);
-            continue;
-        }
-        let before = truth.len();
-        for (id, pose) in again {
-            truth.entry(id).or_insert(pose);
-        }
-        if truth.len() > before {
-            ledger.note(format!("{} true poses are in {} alone", truth.len() - before, file.file));
-        }
-    }
-    truth
-}
-
-/// Landmarks in their cameras: of the truth, or of the graph where it alone has landmarks.
-fn sights(
-    association: &Rows,
-    graph: &Rows,
-    truth: &Poses,
-    landmarks: &Points,
-    vertices: &Vertices,
-) -> Vec<Sight> {
-    let tries = [
-        (association, truth, landmarks),
-        (graph, truth, landmarks),
-        (graph, &vertices.poses, &vertices.points),
-        (association, &vertices.poses, &vertices.points),
-    ];
-    for (rows, poses, points) in tries {
-        let stride = rows.points.len().div_ceil(SAMPLED_SIGHTS).max(1);
-        let found: Vec<Sight> = rows
-            .points
-            .iter()
-            .step_by(stride)
-            .filter_map(|row| {
-                let pose = poses.get(&row.frame_id)?;
-                Some(sight(&pose.camera_from_world, *points.get(&row.point_id)?, row.u, row.v))
-            })
-            .collect();
-        if !found.is_empty() {
-            return found;
-        }
-    }
-    Vec::new()
-}
-
-fn plucker(lines: &Segments) -> BTreeMap<LineId, PluckerLine> {
-    lines.iter().filter_map(|(id, segment)| Some((*id, segment.plucker().ok()?))).collect()
-}
-
-fn judged(
-    rows: Rows,
-    truth: &Poses,
-    camera: &PinholeCamera,
-    points: &Points,
-    lines: &BTreeMap<LineId, PluckerLine>,
-) -> Judged {
-    let tracks = by_line(&rows.lines);
-    let fits = fit_lines(&tracks, truth, camera);
-    let judged_lines = (!rows.lines.is_empty()).then(|| judge_lines(&tracks, &fits, truth, camera, lines));
-    let judged_points = (!rows.points.is_empty()).then(|| judge_points(&rows.points, truth, camera, points));
-    drop(tracks);
-    Judged { rows, fits, points: judged_points, lines: judged_lines }
-}
-
-fn verdict(judgement: Option<&Judgement>) -> Option<Verdict> {
-    judgement.map(|judgement| judgement.verdict)
 }
 
 /// Every frame that anything names, stamped by a clock of 30 Hz.
@@ -317,101 +183,6 @@ fn frames(truth: &Poses, rows: [&Rows; 2], graph: &Poses, results: &Estimates) -
 fn stamp_nanos(FrameId(id): FrameId) -> i64 {
     let (seconds, rest) = (id / RATE_HZ, id % RATE_HZ);
     seconds * 1_000_000_000 + (rest * 1_000_000_000 + RATE_HZ / 2) / RATE_HZ
-}
-
-/// The depths of measured line ends against the best lines at hand: fitted to noise-free rows; published, where the rows lie on
-/// them; fitted to the noisy rows themselves.
-fn depth_misses(
-    measured: &Judged,
-    association: &Judged,
-    published: &BTreeMap<LineId, PluckerLine>,
-    truth: &Poses,
-    camera: &PinholeCamera,
-) -> Vec<DepthMiss> {
-    let exact = verdict(association.lines.as_ref()) == Some(Verdict::NoiseFree);
-    let fitted = |judged: &Judged, id: &LineId| Some(judged.fits.get(id)?.as_ref().ok()?.line);
-    by_line(&measured.rows.lines)
-        .iter()
-        .filter_map(|(id, track)| {
-            let of_exact = exact.then(|| fitted(association, id)).flatten();
-            let line = of_exact.or_else(|| match (published.get(id).copied(), fitted(measured, id)) {
-                // Published lines may have been turned, or be wrong.
-                (Some(published), Some(own)) => {
-                    let views = line_views(track, truth, camera);
-                    let squares =
-                        |line: &PluckerLine| line_distances(&views, line).iter().map(|d| d * d).sum::<f64>();
-                    Some(if squares(&published) < 1.2 * squares(&own) { published } else { own })
-                }
-                (published, own) => published.or(own),
-            })?;
-            Some(line_depths(track, truth, camera, &line))
-        })
-        .flatten()
-        .collect()
-}
-
-/// Remarks for people that no figure of the manifest carries.
-#[expect(clippy::too_many_arguments, reason = "looks at everything once, at the end")]
-fn remark(
-    text: &TextSequence,
-    choice: &Choice,
-    tables: [Assignment; 2],
-    truth: &Poses,
-    sequence: &Sequence,
-    results: &Estimates,
-    vertices: &Vertices,
-    ledger: &mut Ledger,
-) {
-    if choice.is_doubtful() {
-        ledger.note(format!(
-            "no known camera fits: the best ({}) misses by {:.1} px in the median; give the right one with --camera",
-            choice.family_name(),
-            choice.residual_px.unwrap_or_default()
-        ));
-    } else if choice.family.is_none() && choice.by != "given" {
-        ledger.note("neither rows nor name tell the camera; that of the simulated sequences is assumed, give the right one with --camera".to_owned());
-    }
-    if choice.beyond_image > 0 {
-        let PinholeCamera { width, height, .. } = choice.camera;
-        ledger.note(format!(
-            "{} positions lie far beyond the image of {width}x{height} px",
-            choice.beyond_image
-        ));
-    }
-    for (kind, tables) in ["points", "lines"].into_iter().zip(tables) {
-        if tables.graph_apart {
-            ledger.note(format!(
-                "{kind}: the noisy rows of the association are the measurements; the graph has other ones, which stand in its factors"
-            ));
-        }
-    }
-    let blind = sequence.frames.len() - truth.len().min(sequence.frames.len());
-    if blind > 0 {
-        ledger.note(format!("{blind} frames have no true pose"));
-    }
-    if let Some(estimate) = results.get(registry::MAP_TO_FRAME) {
-        let (distance, common) = largest_distance(&estimate.poses, &vertices.poses);
-        if common > 0 && distance > REPEATED_TRUTH {
-            ledger.note(format!(
-                "poses of the graph and of {} are up to {distance:.3} m apart: two runs",
-                registry::MAP_TO_FRAME
-            ));
-        }
-    }
-    if text.association.is_none() {
-        ledger.note("no association: measurements are those of the graph".to_owned());
-    }
-    let lines: BTreeSet<LineId> = sequence.line_landmarks.iter().map(|line| line.line_id).collect();
-    let shown: BTreeSet<LineId> = sequence
-        .line_observations
-        .iter()
-        .map(|row| row.line_id)
-        .chain(sequence.line_measurements.iter().map(|row| row.line_id))
-        .collect();
-    let unknown = shown.difference(&lines).count();
-    if unknown > 0 && !lines.is_empty() {
-        ledger.note(format!("{unknown} lines are seen and have no landmark"));
-    }
 }
 
 #[cfg(test)]

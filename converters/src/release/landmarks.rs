@@ -6,6 +6,7 @@ use nalgebra::Point3;
 use open_structure::geometry::Segment;
 use open_structure::structure::{LineId, PointId};
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 const AGAIN: &str = "landmark comes again; the first is kept";
 const BAD_ID: &str = "landmark id is negative";
@@ -21,8 +22,8 @@ pub(super) fn points(rows: &[PointLine], file: &str, ledger: &mut Ledger) -> Poi
     for row in rows {
         if row.id < 0 {
             ledger.exclude(file, BAD_ID, Some(row.row));
-        } else if let std::collections::btree_map::Entry::Vacant(e) = points.entry(PointId(row.id)) {
-            e.insert(Point3::from(row.position));
+        } else if let Entry::Vacant(place) = points.entry(PointId(row.id)) {
+            place.insert(Point3::from(row.position));
         } else {
             ledger.exclude(file, AGAIN, Some(row.row));
         }
@@ -36,9 +37,8 @@ pub(super) fn segments(rows: &[SegmentLine], file: &str, ledger: &mut Ledger) ->
     for row in rows {
         if row.id < 0 {
             ledger.exclude(file, BAD_ID, Some(row.row));
-        } else if let std::collections::btree_map::Entry::Vacant(e) = segments.entry(LineId(row.id)) {
-            let segment = Segment { start: Point3::from(row.start), end: Point3::from(row.end) };
-            e.insert(segment);
+        } else if let Entry::Vacant(place) = segments.entry(LineId(row.id)) {
+            place.insert(Segment { start: Point3::from(row.start), end: Point3::from(row.end) });
         } else {
             ledger.exclude(file, AGAIN, Some(row.row));
         }

@@ -69,7 +69,9 @@ fn fit_line(track: &[&LineMeasurement], poses: &Poses, camera: &PinholeCamera) -
     // Four numbers were fitted; two views are met exactly, and say nothing about noise.
     if n > 4.0 {
         let enlarged = (n / (n - 4.0)).sqrt();
-        distances_px.iter_mut().for_each(|distance| *distance *= enlarged);
+        for distance in &mut distances_px {
+            *distance *= enlarged;
+        }
     } else {
         distances_px.clear();
     }

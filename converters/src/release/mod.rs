@@ -18,14 +18,17 @@ mod describe;
 mod estimates;
 mod graph;
 mod groups;
+mod judged;
 mod landmarks;
 mod ledger;
 mod line_fit;
 mod noise;
 mod poses;
 mod recover;
+mod remarks;
 mod residual;
 mod rows;
+mod tables;
 
 pub use convert::{Converted, Error, Options, convert};
 pub use decide::{Judgement, NOISE_FREE_PX, Verdict};

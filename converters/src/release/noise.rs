@@ -85,6 +85,7 @@ fn declared(found: f64, nominal: f64) -> f64 {
 }
 
 #[cfg(test)]
+#[expect(clippy::float_cmp, reason = "the very value is declared")]
 mod tests {
     use super::*;
 

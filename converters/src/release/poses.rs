@@ -1,7 +1,7 @@
 //! Poses by frame: rows checked, the first of each frame kept.
 
 use super::ledger::Ledger;
-use crate::text_release::PoseLine;
+use crate::text_release::{PoseLine, TextSequence};
 use open_structure::geometry::Pose;
 use open_structure::structure::{FrameId, PoseRow};
 use std::collections::BTreeMap;
@@ -77,4 +77,39 @@ pub(super) fn largest_angle(one: &Poses, other: &Poses) -> f64 {
 pub(super) fn is_coarse(poses: &Poses) -> bool {
     let coarse = |number: f64| (number * 1e4 - (number * 1e4).round()).abs() < 1e-6;
     !poses.is_empty() && poses.values().all(|pose| pose.row.numbers().iter().all(|number| coarse(*number)))
+}
+
+/// Ground truth that is printed again may differ by its rounding, metres and radians.
+pub(super) const REPEATED_TRUTH: f64 = 2e-3;
+
+/// The true poses: of the file with all digits, or of one that prints them again.
+pub(super) fn true_poses(text: &TextSequence, ledger: &mut Ledger) -> Poses {
+    let repeated = || text.repeated_ground_truth.iter();
+    let first = text.ground_truth.as_ref().or_else(|| {
+        let most = repeated().map(|file| file.poses.len()).max();
+        repeated().find(|file| Some(file.poses.len()) == most)
+    });
+    let Some(first) = first else { return Poses::new() };
+    let mut truth = poses(&first.poses, &first.file, ledger);
+    for file in repeated().filter(|file| file.file != first.file) {
+        let again = poses(&file.poses, &file.file, ledger);
+        let (distance, _) = largest_distance(&truth, &again);
+        let angle = largest_angle(&truth, &again);
+        if distance > REPEATED_TRUTH || angle > REPEATED_TRUTH {
+            let reason = format!(
+                "ground truth differs from {} by up to {distance:.4} m, {angle:.4} rad; the latter is kept",
+                first.file
+            );
+            ledger.exclude_many(&file.file, &reason, again.len() as u64, None);
+            continue;
+        }
+        let before = truth.len();
+        for (id, pose) in again {
+            truth.entry(id).or_insert(pose);
+        }
+        if truth.len() > before {
+            ledger.note(format!("{} true poses are in {} alone", truth.len() - before, file.file));
+        }
+    }
+    truth
 }

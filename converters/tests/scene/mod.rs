@@ -1,5 +1,5 @@
 //! A small scene, and a text release of it as the published ones look.
-#![allow(dead_code, reason = "each test program uses its part")]
+#![allow(clippy::format_collect, reason = "tests")]
 
 use nalgebra::{Point2, Point3, UnitQuaternion, Vector3};
 use open_structure::geometry::{PinholeCamera, Pose, Segment};

@@ -21,6 +21,7 @@ struct Corpus {
 }
 
 /// The corpus, built once for the tests that run side by side.
+#[expect(clippy::unwrap_used, reason = "tests")]
 fn corpus() -> Arc<Corpus> {
     static SHARED: Mutex<Weak<Corpus>> = Mutex::new(Weak::new());
     let mut shared = SHARED.lock().unwrap();

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
-use open_structure::structure::{ColumnType, Field};
+use open_structure::structure::{ColumnType, Field, hex};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
@@ -112,7 +112,7 @@ fn digest(table: &Table) -> String {
             put(field, table.cell(row, field.name).unwrap_or(&Cell::Null), &mut bytes);
         }
     }
-    Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+    hex(&Sha256::digest(&bytes))
 }
 
 fn put(field: &Field, cell: &Cell, bytes: &mut Vec<u8>) {

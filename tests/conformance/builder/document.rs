@@ -145,8 +145,8 @@ impl Cell {
     }
 
     /// The same value for a column of another type.
-    pub(crate) fn retyped(self, kind: Kind) -> Result<Self> {
-        Ok(match (self, kind) {
+    pub(crate) fn retyped(self, kind: Kind) -> Self {
+        match (self, kind) {
             (Self::Int(value), Kind::Float64 | Kind::Float32) => Self::Float(value as f64),
             (Self::Int(value), Kind::Utf8 | Kind::LargeUtf8) => Self::Text(value.to_string()),
             (Self::Int(value), Kind::Boolean) => Self::Bool(value != 0),
@@ -162,7 +162,7 @@ impl Cell {
             (Self::Ints(values), Kind::Utf8) => Self::Text(format!("{values:?}")),
             (Self::Floats(values), Kind::Float64) => Self::Float(values.into_iter().flatten().sum()),
             (same, _) => same,
-        })
+        }
     }
 
     pub(crate) fn int(&self) -> Option<i64> {

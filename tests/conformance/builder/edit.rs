@@ -268,7 +268,7 @@ impl Edit {
                 let index = table.column(column)?;
                 table.columns[index].kind = kind;
                 for row in &mut table.rows {
-                    row[index] = row[index].clone().retyped(kind)?;
+                    row[index] = row[index].clone().retyped(kind);
                 }
             }
             Self::MarkColumns { table, columns, nullable } => {

@@ -6,40 +6,41 @@ use std::path::Path;
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
-use super::{Case, Result, Stored, cases, document, store};
+use super::{Case, Expected, Result, cases, document, store};
 
 /// Version of the layout that [`export`] writes, as `major.minor.patch`.
 pub(crate) const CORPUS_VERSION: &str = "1.0.0";
 
-/// Findings of a case in one encoding.
-fn findings(case: &Case, stored: Stored) -> Vec<Value> {
-    let following = case.findings.iter().filter(|finding| finding.follows_in(stored));
-    following
-        .map(|finding| {
-            let mut json = json!({ "rule": finding.rule, "severity": finding.severity });
-            if let Some(table) = &finding.table {
-                json["table"] = table.as_str().into();
-            }
-            if finding.optional {
-                json["optional"] = true.into();
-            }
-            json
-        })
-        .collect()
+/// What `expected.json` says of a finding.
+fn finding(expected: &Expected) -> Value {
+    let mut json = json!({ "rule": expected.rule, "severity": expected.severity });
+    if let Some(table) = &expected.table {
+        json["table"] = table.as_str().into();
+    }
+    if expected.optional {
+        json["optional"] = true.into();
+    }
+    json
 }
 
 /// What `expected.json` says of a case.
 fn expected(case: &Case) -> Value {
     let encodings = case.encodings.iter().map(|stored| {
-        let json = json!({ "path": stored.file_name(), "findings": findings(case, *stored) });
+        let following = case.findings.iter().filter(|expected| expected.follows_in(*stored));
+        let findings: Vec<Value> = following.map(finding).collect();
+        let json = json!({ "path": stored.file_name(), "findings": findings });
         (stored.name().to_owned(), json)
     });
-    json!({
+    let mut json = json!({
         "corpus_version": CORPUS_VERSION,
         "case": case.name,
         "title": case.title,
         "encodings": encodings.collect::<serde_json::Map<_, _>>(),
-    })
+    });
+    if let Some(rule) = case.rule() {
+        json["rule"] = rule.into();
+    }
+    json
 }
 
 /// Writes every case below a folder that is not there yet: `<case>/sequence.mcap`, `<case>/sequence/` and

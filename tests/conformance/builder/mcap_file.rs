@@ -19,6 +19,7 @@ use super::{Result, arrays};
 /// How the file is written.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of its own")]
 pub(crate) struct Options {
     profile: Option<String>,
     /// Replaces the values of the identity record; a null takes one out.
@@ -60,6 +61,7 @@ pub(crate) struct Options {
 /// Which messages of a topic are changed, and how.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of its own")]
 pub(crate) struct MessageEdit {
     topic: String,
     /// Which message of the topic; all without it.

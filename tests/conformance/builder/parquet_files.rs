@@ -14,6 +14,7 @@ use super::{Result, arrays};
 /// How the files are written.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of its own")]
 pub(crate) struct Options {
     /// `none` (the default), `snappy`, `lz4` or `zstd`.
     compression: Option<String>,

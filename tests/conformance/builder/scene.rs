@@ -45,6 +45,7 @@ struct Exposure {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
+#[expect(clippy::struct_field_names, reason = "columns bear these names")]
 struct Point {
     point_id: i64,
     /// Position in `world`, metres.
@@ -54,6 +55,7 @@ struct Point {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
+#[expect(clippy::struct_field_names, reason = "columns bear these names")]
 struct Line {
     line_id: i64,
     start: [f64; 3],
@@ -62,6 +64,7 @@ struct Line {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
+#[expect(clippy::struct_field_names, reason = "columns bear these names")]
 struct Group {
     group_id: i64,
     kind: String,

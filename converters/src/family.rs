@@ -160,7 +160,7 @@ pub struct Choice {
     pub residuals_px: Vec<(&'static str, f64)>,
     /// What decided: `data`, `name`, `given`, `default`.
     pub by: &'static str,
-    /// Rows farther than [`STRAY_PX`] beyond the image.
+    /// Rows farther than 6 px beyond the image.
     pub beyond_image: usize,
 }
 

@@ -94,16 +94,20 @@ pub(crate) fn median_time<T>(runs: usize, mut run: impl FnMut() -> T) -> Duratio
     median(&mut times)
 }
 
-/// The median of how many times longer the first takes than the second, run in turn, so that both meet
-/// the same machine.
+/// How many times longer the first takes than the second: the median ratio of `blocks` blocks. In each,
+/// both run a few times in a row, the first run of either uncounted, so that both meet the same machine
+/// and neither finds the other's memory in its way.
 pub(crate) fn median_ratio<T, U>(
-    runs: usize,
+    blocks: usize,
     mut first: impl FnMut() -> T,
     mut second: impl FnMut() -> U,
 ) -> f64 {
-    let mut ratios: Vec<f64> = (0..=runs)
-        .map(|_| time_of(&mut first).as_secs_f64() / time_of(&mut second).as_secs_f64())
-        .skip(1)
+    const IN_A_ROW: usize = 5;
+    let mut ratios: Vec<f64> = (0..blocks)
+        .map(|_| {
+            let first = median_time(IN_A_ROW, &mut first);
+            first.as_secs_f64() / median_time(IN_A_ROW, &mut second).as_secs_f64()
+        })
         .collect();
     ratios.sort_unstable_by(f64::total_cmp);
     ratios[ratios.len() / 2]

@@ -65,7 +65,7 @@ fn against_text(figures: &mut Figures, file: &Published, folder: &Path) -> Resul
         "million rows/s",
         Bound::None,
     );
-    let ratio = one_core(|| median_ratio(2 * RUNS, || file.parse(), read))?;
+    let ratio = one_core(|| median_ratio(RUNS, || file.parse(), read))?;
     figures.add(
         "reading office3's points and lines: Parquet on disk over text in memory",
         ratio,

@@ -3,7 +3,6 @@
 //! `cargo run --example conformance_corpus -- OUT`
 
 #[path = "../tests/conformance/builder/mod.rs"]
-#[allow(dead_code, unused_imports, reason = "the tests use what is not used here")]
 mod builder;
 
 use std::path::Path;

@@ -103,37 +103,8 @@ pub(crate) fn graphs(
     ]
 }
 
-/// What the registry says of a kind of factor.
-struct Shape {
-    /// Whether `frame_id`, `other_frame_id`, `point_id`, `line_id`, `group_id` are named.
-    vertices: [bool; 5],
-    measurement: &'static [usize],
-    /// Dimension of the information matrix for a measurement of so many numbers.
-    dimension: fn(usize) -> usize,
-}
-
-fn registered(kind: &str) -> Option<Shape> {
-    const YES: bool = true;
-    const NO: bool = false;
-    Some(match kind {
-        registry::POINT_REPROJECTION => {
-            Shape { vertices: [YES, NO, YES, NO, NO], measurement: &[2, 3], dimension: |count| count }
-        }
-        registry::LINE_REPROJECTION => {
-            Shape { vertices: [YES, NO, NO, YES, NO], measurement: &[4, 6], dimension: |count| count }
-        }
-        registry::RELATIVE_POSE => {
-            Shape { vertices: [YES, YES, NO, NO, NO], measurement: &[7], dimension: |_| 6 }
-        }
-        registry::PARALLELISM => {
-            Shape { vertices: [NO, NO, NO, YES, YES], measurement: &[0], dimension: |_| 3 }
-        }
-        _ => return None,
-    })
-}
-
 fn shape(factor: &GraphFactor, row: u64, findings: &mut Findings) {
-    let Some(shape) = registered(&factor.kind) else { return };
+    let Some(shape) = registry::factor_shape(&factor.kind) else { return };
     let named = [
         ("frame_id", factor.frame_id.is_some()),
         ("other_frame_id", factor.other_frame_id.is_some()),
@@ -147,7 +118,8 @@ fn shape(factor: &GraphFactor, row: u64, findings: &mut Findings) {
             Detail::new(expected, found).row(row).id(id)
         });
     };
-    for ((column, there), wanted) in named.into_iter().zip(shape.vertices) {
+    for (column, there) in named {
+        let wanted = shape.columns.contains(&column);
         if there != wanted {
             let word = |there: bool| if there { "a value" } else { "null" };
             broken(
@@ -157,12 +129,14 @@ fn shape(factor: &GraphFactor, row: u64, findings: &mut Findings) {
         }
     }
     let count = factor.measurement.len();
-    if !shape.measurement.contains(&count) {
-        let counts: Vec<String> = shape.measurement.iter().map(ToString::to_string).collect();
+    let Some(size) = shape.sizes.iter().find(|size| size.measurement == count) else {
+        let counts: Vec<String> = shape.sizes.iter().map(|size| size.measurement.to_string()).collect();
         let expected = format!("a measurement of {} numbers for {}", counts.join(" or "), factor.kind);
         broken(expected, format!("{count} numbers"));
-    } else if let Some(information) = &factor.information {
-        let dimension = (shape.dimension)(count);
+        return;
+    };
+    if let Some(information) = &factor.information {
+        let dimension = size.dimension;
         let wanted = dimension * (dimension + 1) / 2;
         if information.len() != wanted {
             let expected =

@@ -7,10 +7,12 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 
+use super::batches::{BatchSource, Batches};
 use super::encoding::Encoding;
-use super::mcap_reader::{McapReader, Message, Messages};
+use super::frames::{Cursors, FrameSource, Frames, frame_topics, take_into};
+use super::mcap_reader::McapReader;
 use super::mcap_survey::McapSurvey;
-use super::parquet_reader::{ParquetBatches, ParquetTableReader};
+use super::parquet_reader::ParquetTableReader;
 use super::stored_table::StoredTable;
 use super::{Error, names};
 use crate::structure::{
@@ -247,7 +249,7 @@ impl SequenceReader {
                 None => BatchSource::Empty,
             },
         };
-        Ok(Batches { source, row: 0, log_time: None, row_type: std::marker::PhantomData })
+        Ok(Batches::new(source))
     }
 
     /// Every table.
@@ -362,7 +364,7 @@ impl SequenceReader {
             }
             Backend::Parquet(tables) => FrameSource::Parquet(Box::new(Cursors::new(tables)?)),
         };
-        Ok(Frames { waiting: frames, source, failed: false })
+        Ok(Frames::new(frames, source))
     }
 
     /// Reads the container through and checks its checksums; Parquet folders have theirs in the manifest.
@@ -442,233 +444,4 @@ fn open_tables(path: &Path, bytes_read: &Arc<AtomicU64>) -> Result<OpenedTables,
     passed_over.sort();
     damaged.sort_by_key(|(table, _)| table.name);
     Ok((tables, passed_over, damaged))
-}
-
-/// Topics of the per-frame tables.
-fn frame_topics() -> Vec<String> {
-    let mut topics = Vec::new();
-    macro_rules! each {
-        ($($name:ident: $row:ident,)+) => { $(topics.push($row::TABLE.topic());)+ };
-    }
-    for_each_frame_table!(each);
-    topics
-}
-
-enum BatchSource<'a> {
-    Empty,
-    Mcap(&'a McapReader, Box<Messages>),
-    Parquet(Box<ParquetBatches>),
-}
-
-/// Rows of a table, a batch at a time.
-pub struct Batches<'a, R> {
-    source: BatchSource<'a>,
-    row: u64,
-    log_time: Option<u64>,
-    row_type: std::marker::PhantomData<fn() -> R>,
-}
-
-impl<R> Batches<'_, R> {
-    /// Stamp of the message that held the last batch, nanoseconds; `None` for a Parquet file.
-    pub(crate) const fn log_time(&self) -> Option<u64> {
-        self.log_time
-    }
-}
-
-impl<R: Record> Batches<'_, R> {
-    /// Appends the next batch to rows; `None` at the end.
-    fn next_into(&mut self, rows: &mut Vec<R>) -> Option<Result<(), Error>> {
-        let before = rows.len();
-        let result = match &mut self.source {
-            BatchSource::Empty => None,
-            BatchSource::Parquet(batches) => batches.next_into(rows),
-            BatchSource::Mcap(reader, messages) => loop {
-                let message = match messages.next()? {
-                    Ok(message) => message,
-                    Err(error) => break Some(Err(error)),
-                };
-                let log_time = message.log_time;
-                match reader.rows_into(message, self.row, rows) {
-                    Ok(false) => {}
-                    Ok(true) => {
-                        self.log_time = Some(log_time);
-                        break Some(Ok(()));
-                    }
-                    Err(error) => break Some(Err(error)),
-                }
-            },
-        };
-        match &result {
-            Some(Ok(())) => self.row += (rows.len() - before) as u64,
-            Some(Err(_)) => self.source = BatchSource::Empty,
-            None => {}
-        }
-        result
-    }
-}
-
-impl<R: Record> Iterator for Batches<'_, R> {
-    type Item = Result<Vec<R>, Error>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        let mut rows = Vec::new();
-        Some(self.next_into(&mut rows)?.map(|()| rows))
-    }
-}
-
-/// Rows of one table that wait for their frame.
-struct TableCursor<R> {
-    batches: Option<ParquetBatches>,
-    ahead: VecDeque<R>,
-}
-
-impl<R: Record> TableCursor<R> {
-    fn new(tables: &BTreeMap<&'static str, ParquetTableReader>) -> Result<Self, Error> {
-        let batches = tables.get(R::TABLE.name).map(ParquetTableReader::batches::<R>).transpose()?;
-        Ok(Self { batches, ahead: VecDeque::new() })
-    }
-
-    /// Rows of a frame; rows of earlier frames, which are not in the list, are passed over.
-    fn take(&mut self, frame_id: FrameId) -> Result<Vec<R>, Error> {
-        let mut rows = Vec::new();
-        loop {
-            while let Some(row) = self.ahead.front() {
-                match row.frame().cmp(&Some(frame_id)) {
-                    std::cmp::Ordering::Greater => return Ok(rows),
-                    std::cmp::Ordering::Equal => rows.extend(self.ahead.pop_front()),
-                    std::cmp::Ordering::Less => drop(self.ahead.pop_front()),
-                }
-            }
-            match self.batches.as_mut().and_then(ParquetBatches::next_rows::<R>) {
-                Some(batch) => self.ahead = batch?.into(),
-                None => return Ok(rows),
-            }
-        }
-    }
-}
-
-macro_rules! cursors {
-    ($($name:ident: $row:ident,)+) => {
-        /// A cursor for every per-frame table.
-        struct Cursors {
-            $($name: TableCursor<$row>,)+
-        }
-
-        impl Cursors {
-            fn new(tables: &BTreeMap<&'static str, ParquetTableReader>) -> Result<Self, Error> {
-                Ok(Self { $($name: TableCursor::new(tables)?),+ })
-            }
-
-            fn take(&mut self, frame: &Frame) -> Result<FrameBundle, Error> {
-                Ok(FrameBundle { frame: frame.clone(), $($name: self.$name.take(frame.frame_id)?),+ })
-            }
-        }
-    };
-}
-for_each_frame_table!(cursors);
-
-enum FrameSource<'a> {
-    Mcap {
-        reader: &'a McapReader,
-        messages: Box<Messages>,
-        ahead: Option<Message>,
-        ready: BTreeMap<FrameId, FrameBundle>,
-    },
-    Parquet(Box<Cursors>),
-}
-
-/// Frames in order, each with its rows.
-pub struct Frames<'a> {
-    waiting: VecDeque<&'a Frame>,
-    source: FrameSource<'a>,
-    failed: bool,
-}
-
-impl Frames<'_> {
-    fn bundle(&mut self, frame: &Frame) -> Result<FrameBundle, Error> {
-        match &mut self.source {
-            FrameSource::Parquet(cursors) => cursors.take(frame),
-            FrameSource::Mcap { reader, messages, ahead, ready } => {
-                let stamp = u64::try_from(frame.stamp_nanos).unwrap_or(0);
-                // Frames of several cameras may share a stamp, so all messages up to it are taken first.
-                loop {
-                    let message = match ahead.take() {
-                        Some(message) => message,
-                        None => match messages.next() {
-                            Some(message) => message?,
-                            None => break,
-                        },
-                    };
-                    if message.log_time > stamp {
-                        *ahead = Some(message);
-                        break;
-                    }
-                    take_into(reader, message, ready)?;
-                }
-                let mut bundle = ready.remove(&frame.frame_id).unwrap_or_default();
-                bundle.frame = frame.clone();
-                // What is left of earlier frames belongs to none in the list.
-                ready.retain(|frame_id, _| *frame_id > frame.frame_id);
-                Ok(bundle)
-            }
-        }
-    }
-}
-
-/// Puts the rows of a per-frame message among those that wait for their frame.
-fn take_into(
-    reader: &McapReader,
-    message: Message,
-    ready: &mut BTreeMap<FrameId, FrameBundle>,
-) -> Result<(), Error> {
-    macro_rules! each {
-        ($($name:ident: $row:ident,)+) => {
-            match reader.table_of(&message) {
-                $(
-                    Some(stringify!($name)) => {
-                        let mut rows: Vec<$row> = Vec::new();
-                        reader.rows_into(message, 0, &mut rows)?;
-                        match rows.first().map(|row| row.frame_id) {
-                            None => {}
-                            // As it should be: the rows of one frame, which has none yet.
-                            Some(frame_id) if rows.iter().all(|row| row.frame_id == frame_id) => {
-                                let waiting = &mut ready.entry(frame_id).or_default().$name;
-                                if waiting.is_empty() {
-                                    *waiting = rows;
-                                } else {
-                                    waiting.append(&mut rows);
-                                }
-                            }
-                            Some(_) => {
-                                for row in rows {
-                                    ready.entry(row.frame_id).or_default().$name.push(row);
-                                }
-                            }
-                        }
-                    }
-                )+
-                _ => {}
-            }
-        };
-    }
-    for_each_frame_table!(each);
-    Ok(())
-}
-
-impl Iterator for Frames<'_> {
-    type Item = Result<FrameBundle, Error>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        if self.failed {
-            return None;
-        }
-        let frame = self.waiting.pop_front()?;
-        let result = self.bundle(frame);
-        self.failed = result.is_err();
-        Some(result)
-    }
-
-    fn size_hint(&self) -> (usize, Option<usize>) {
-        (self.waiting.len(), Some(self.waiting.len()))
-    }
 }

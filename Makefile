@@ -10,6 +10,8 @@ SHELL := /bin/bash
 CORPUS ?= out/conformance
 # Seconds for each fuzz target.
 FUZZ_SECONDS ?= 30
+# More arguments of libFuzzer.
+FUZZ_ARGS ?=
 
 # Tests, benchmarks and examples stop at what they did not expect, and need not be pretty.
 TESTS_MAY := $(addprefix --allow clippy::,pedantic unwrap_used expect_used print_stdout print_stderr)
@@ -47,7 +49,7 @@ fuzz:
 	  echo "== fuzz $$target, $(FUZZ_SECONDS) s"; \
 	  mkdir -p "fuzz/corpus/$$target"; \
 	  cargo fuzz run "$$target" --sanitizer none "fuzz/corpus/$$target" "fuzz/seeds/$$target" -- \
-	    -max_total_time=$(FUZZ_SECONDS) -rss_limit_mb=2048 -timeout=10 -max_len=65536; \
+	    -max_total_time=$(FUZZ_SECONDS) -rss_limit_mb=2048 -timeout=10 -max_len=65536 $(FUZZ_ARGS); \
 	done
 
 conformance-corpus:

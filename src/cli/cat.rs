@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::Outcome;
 use crate::format::{self, SequenceReader};
-use crate::structure::{FrameId, Record, TABLES, for_each_table};
+use crate::structure::{FrameId, Record, Sequence, Storage, TABLES, for_each_table};
 
 /// Print the rows of a table as JSON lines or CSV.
 ///
@@ -94,16 +94,19 @@ fn print<R: Record>(args: &Args, reader: &SequenceReader, stdout: &mut dyn Write
 
 /// The rows of a frame: through the index for per-frame tables, by looking at all rows for the others.
 fn rows_of_frame<R: Record>(reader: &SequenceReader, frame_id: FrameId) -> anyhow::Result<Option<Vec<R>>> {
-    let Some(bundle) = reader.frame(frame_id)? else { return Ok(None) };
-    let mut sequence = crate::structure::Sequence::default();
-    sequence.frames.push(bundle.frame);
-    sequence.point_observations = bundle.point_observations;
-    sequence.line_observations = bundle.line_observations;
-    sequence.point_measurements = bundle.point_measurements;
-    sequence.line_measurements = bundle.line_measurements;
-    let rows = R::rows(&sequence);
-    if !rows.is_empty() || R::TABLE.storage == crate::structure::Storage::PerFrame {
-        return Ok(Some(rows.clone()));
+    if R::TABLE.storage == Storage::PerFrame {
+        let Some(bundle) = reader.frame(frame_id)? else { return Ok(None) };
+        let sequence = Sequence {
+            point_observations: bundle.point_observations,
+            line_observations: bundle.line_observations,
+            point_measurements: bundle.point_measurements,
+            line_measurements: bundle.line_measurements,
+            ..Sequence::default()
+        };
+        return Ok(Some(R::rows(&sequence).clone()));
+    }
+    if reader.frame_list()?.iter().all(|frame| frame.frame_id != frame_id) {
+        return Ok(None);
     }
     if R::TABLE.fields.iter().all(|field| field.name != "frame_id") {
         bail!("{} has no column frame_id; leave --frame out", R::TABLE.name);

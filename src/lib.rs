@@ -4,6 +4,8 @@
 pub mod cli;
 pub mod format;
 pub mod geometry;
+pub mod simulate;
+pub mod statistics;
 pub mod structure;
 pub mod validate;
 

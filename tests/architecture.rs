@@ -16,9 +16,23 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("simulate", &["geometry", "structure"]),
     ("track", &["geometry", "structure"]),
     ("adjust", &["geometry", "structure"]),
+    ("statistics", &["geometry", "structure"]),
     ("evaluate", &["geometry", "structure"]),
     ("validate", &["geometry", "structure", "format", "simulate", "track", "adjust", "evaluate"]),
-    ("cli", &["geometry", "structure", "format", "simulate", "track", "adjust", "evaluate", "validate"]),
+    (
+        "cli",
+        &[
+            "geometry",
+            "structure",
+            "format",
+            "simulate",
+            "statistics",
+            "track",
+            "adjust",
+            "evaluate",
+            "validate",
+        ],
+    ),
 ];
 
 /// Libraries that only some may name, and why.

@@ -34,12 +34,12 @@ pub(super) fn perpendicular(direction: Vector3<f64>) -> Vector3<f64> {
 
 /// The angle between two directions of any length, radians in `[0, π]`.
 pub(super) fn angle(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
-    a.cross(b).norm().atan2(a.dot(b))
+    libm::atan2(a.cross(b).norm(), a.dot(b))
 }
 
 /// The angle between two endless lines of these directions, radians in `[0, π/2]`.
 pub(super) fn unsigned_angle(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
-    a.cross(b).norm().atan2(a.dot(b).abs())
+    libm::atan2(a.cross(b).norm(), a.dot(b).abs())
 }
 
 #[cfg(test)]

@@ -70,7 +70,7 @@ impl OrthonormalLine {
         let frame = Matrix3::from_columns(&[moment_axis, direction, moment_axis.cross(&direction)]);
         let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(frame));
         let rotation = UnitQuaternion::new_normalize(rotation.into_inner());
-        Self { phi: rotation_log(&rotation), varphi: 1.0_f64.atan2(distance) }
+        Self { phi: rotation_log(&rotation), varphi: libm::atan2(1.0, distance) }
     }
 
     /// `U`, whose columns are the unit vectors of moment, direction, and moment × direction.
@@ -83,7 +83,8 @@ impl OrthonormalLine {
     pub fn plucker(&self) -> PluckerLine {
         let frame = self.frame();
         // The number nearest to π/2 stands for π/2.
-        let distance = if self.varphi >= FRAC_PI_2 { 0.0 } else { self.varphi.cos() / self.varphi.sin() };
+        let distance =
+            if self.varphi >= FRAC_PI_2 { 0.0 } else { libm::cos(self.varphi) / libm::sin(self.varphi) };
         PluckerLine { moment: frame.column(0) * distance, direction: frame.column(1).into_owned() }
     }
 

@@ -160,7 +160,7 @@ impl PluckerLine {
             return Err(no_image);
         }
         let line = camera.line_matrix() * moment;
-        let scale = line.x.hypot(line.y);
+        let scale = libm::hypot(line.x, line.y);
         // A line over 1e12 px away.
         if scale > 1e-12 * line.z.abs() && scale.is_finite() { Ok(line / scale) } else { Err(no_image) }
     }

@@ -114,13 +114,13 @@ impl Pose {
         let squared = angle * angle;
         // (1 − cos θ)/θ² without the difference.
         let half = 0.5 * angle;
-        let sinc = if half < 1e-100 { 1.0 } else { half.sin() / half };
+        let sinc = if half < 1e-100 { 1.0 } else { libm::sin(half) / half };
         let first = 0.5 * sinc * sinc;
         let second = if angle < SMALL_ANGLE {
             (1.0 - squared / 20.0 * (1.0 - squared / 42.0 * (1.0 - squared / 72.0 * (1.0 - squared / 110.0))))
                 / 6.0
         } else {
-            (angle - angle.sin()) / (squared * angle)
+            (angle - libm::sin(angle)) / (squared * angle)
         };
         let across = turn.cross(&shift);
         let translation = shift + across * first + turn.cross(&across) * second;
@@ -141,7 +141,7 @@ impl Pose {
                 / 12.0
         } else {
             let half = 0.5 * angle;
-            (1.0 - half * half.cos() / half.sin()) / squared
+            (1.0 - half * libm::cos(half) / libm::sin(half)) / squared
         };
         let across = turn.cross(&self.translation);
         let shift = self.translation - across * 0.5 + turn.cross(&across) * second;
@@ -151,7 +151,7 @@ impl Pose {
     /// How far the transform turns, radians in `[0, π]`.
     #[must_use]
     pub fn rotation_angle(&self) -> f64 {
-        2.0 * self.rotation.imag().norm().atan2(self.rotation.w.abs())
+        2.0 * libm::atan2(self.rotation.imag().norm(), self.rotation.w.abs())
     }
 
     /// A pose between two: the rotation goes the short way at constant speed, the translation on a straight line.

@@ -9,8 +9,8 @@ pub(super) const SMALL_ANGLE: f64 = 0.1;
 pub(super) fn rotation_exp(vector: &Vector3<f64>) -> UnitQuaternion<f64> {
     let angle = vector.norm();
     // sin(θ/2)/θ; the quotient is exact to rounding for any θ but zero.
-    let factor = if angle < 1e-100 { 0.5 } else { (0.5 * angle).sin() / angle };
-    UnitQuaternion::new_normalize(Quaternion::from_parts((0.5 * angle).cos(), vector * factor))
+    let factor = if angle < 1e-100 { 0.5 } else { libm::sin(0.5 * angle) / angle };
+    UnitQuaternion::new_normalize(Quaternion::from_parts(libm::cos(0.5 * angle), vector * factor))
 }
 
 /// The rotation vector of a rotation; its length is the angle, radians in `[0, π]`.
@@ -23,7 +23,7 @@ pub(super) fn rotation_log(rotation: &UnitQuaternion<f64>) -> Vector3<f64> {
         (w, v) = (-w, -v);
     }
     let sine = v.norm();
-    let factor = if sine < 1e-100 { 2.0 } else { 2.0 * sine.atan2(w) / sine };
+    let factor = if sine < 1e-100 { 2.0 } else { 2.0 * libm::atan2(sine, w) / sine };
     v * factor
 }
 

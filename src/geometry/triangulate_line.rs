@@ -198,7 +198,7 @@ fn join(a: &Vector4<f64>, b: &Vector4<f64>) -> Option<PluckerLine> {
 fn distances(observations: &[LineView], gauge: &Gauge, line: &OrthonormalLine) -> Option<Normal<4>> {
     let frame = line.frame();
     let [u1, u2, u3] = [0, 1, 2].map(|column| frame.column(column).into_owned());
-    let (sin, cos) = line.varphi.sin_cos();
+    let (sin, cos) = libm::sincos(line.varphi);
     let zero = Vector3::zeros();
     // n = cos φ · u₁ and d = sin φ · u₂ (their common scale is free), and their derivatives by δ.
     let (moment, direction) = (u1 * cos, u2 * sin);
@@ -214,7 +214,7 @@ fn distances(observations: &[LineView], gauge: &Gauge, line: &OrthonormalLine) -
         let in_camera_by = rotation * moment_by + shift * direction_by;
         let line_matrix = camera.line_matrix();
         let image = line_matrix * in_camera;
-        let scale = image.x.hypot(image.y);
+        let scale = libm::hypot(image.x, image.y);
         if scale.is_nan() || scale <= 1e-12 * image.z.abs() {
             return None;
         }

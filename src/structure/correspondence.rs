@@ -1,6 +1,9 @@
 //! Which rows show the same landmark: the observation lists turned round.
 
+use std::hash::Hash;
+
 use super::id::{FrameId, LineId, PointId};
+use super::landmark_rows::{LandmarkRows, RowsOfLandmark};
 use super::record::record;
 use super::{LineMeasurement, LineObservation, PointMeasurement, PointObservation};
 
@@ -40,17 +43,28 @@ record! {
     }
 }
 
-/// Rows by landmark: `(id, frames, rows)`, ascending by id.
-fn turned<Id: Copy + Ord>(pairs: impl Iterator<Item = (Id, FrameId)>) -> Vec<(Id, Vec<FrameId>, Vec<i64>)> {
-    let mut keyed: Vec<(Id, FrameId, i64)> =
-        (0..).zip(pairs).map(|(row, (id, frame))| (id, frame, row)).collect();
-    keyed.sort_unstable();
-    keyed
-        .chunk_by(|left, right| left.0 == right.0)
-        .map(|run| {
-            (run[0].0, run.iter().map(|entry| entry.1).collect(), run.iter().map(|entry| entry.2).collect())
-        })
-        .collect()
+macro_rules! from_rows {
+    ($record:ident, $id:ident: $type:ident, $($table:literal),+) => {
+        impl $record {
+            #[doc = concat!("The row of a landmark, for the rows of the table ", $("`", $table, "` ",)+ "that show it.")]
+            #[must_use]
+            pub fn new(table: &str, ($id, frame_ids, rows): RowsOfLandmark<$type>) -> Self {
+                Self { table: table.to_owned(), $id, frame_ids, rows }
+            }
+        }
+    };
+}
+from_rows!(PointCorrespondence, point_id: PointId, "point_measurements", "point_observations");
+from_rows!(LineCorrespondence, line_id: LineId, "line_measurements", "line_observations");
+
+/// Rows by landmark, ascending by id; rows of one frame stand together.
+fn turned<Id: Copy + Ord + Hash>(rows: impl Iterator<Item = (Id, FrameId)>) -> Vec<RowsOfLandmark<Id>> {
+    let rows: Vec<(Id, FrameId)> = rows.collect();
+    let mut gathered = LandmarkRows::default();
+    for run in rows.chunk_by(|left, right| left.1 == right.1) {
+        gathered.push_frame(run[0].1, run.iter().map(|row| row.0));
+    }
+    gathered.pieces(u64::MAX).flatten().collect()
 }
 
 /// Correspondences of the points in whichever of the two tables has rows, ordered as they are stored.
@@ -63,14 +77,7 @@ pub fn point_correspondences(
     let observed = turned(observations.iter().map(|row| (row.point_id, row.frame_id)));
     [("point_measurements", measured), ("point_observations", observed)]
         .into_iter()
-        .flat_map(|(table, lists)| {
-            lists.into_iter().map(move |(point_id, frame_ids, rows)| PointCorrespondence {
-                table: table.to_owned(),
-                point_id,
-                frame_ids,
-                rows,
-            })
-        })
+        .flat_map(|(table, lists)| lists.into_iter().map(move |rows| PointCorrespondence::new(table, rows)))
         .collect()
 }
 
@@ -84,13 +91,6 @@ pub fn line_correspondences(
     let observed = turned(observations.iter().map(|row| (row.line_id, row.frame_id)));
     [("line_measurements", measured), ("line_observations", observed)]
         .into_iter()
-        .flat_map(|(table, lists)| {
-            lists.into_iter().map(move |(line_id, frame_ids, rows)| LineCorrespondence {
-                table: table.to_owned(),
-                line_id,
-                frame_ids,
-                rows,
-            })
-        })
+        .flat_map(|(table, lists)| lists.into_iter().map(move |rows| LineCorrespondence::new(table, rows)))
         .collect()
 }

@@ -57,3 +57,25 @@ macro_rules! bundle {
     };
 }
 for_each_frame_table!(bundle);
+
+impl Sequence {
+    /// Every frame with its rows, in table order; per-frame tables have to be sorted.
+    ///
+    /// Rows of frames that are not in the table `frames` are passed over.
+    pub fn bundles(&self) -> impl Iterator<Item = FrameBundle> + '_ {
+        self.frames.iter().map(|frame| {
+            let mut bundle = FrameBundle { frame: frame.clone(), ..FrameBundle::default() };
+            macro_rules! take {
+                ($($name:ident: $row:ident,)+) => {
+                    $(
+                        let begin = self.$name.partition_point(|row| row.frame_id < frame.frame_id);
+                        let count = self.$name[begin..].partition_point(|row| row.frame_id == frame.frame_id);
+                        bundle.$name = self.$name[begin..begin + count].to_vec();
+                    )+
+                };
+            }
+            for_each_frame_table!(take);
+            bundle
+        })
+    }
+}

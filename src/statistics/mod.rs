@@ -1,0 +1,1 @@
+//! What a sequence is like, in numbers: features, tracks, covisibility, parallax, motion.

@@ -1,0 +1,157 @@
+//! Which rows show which landmark, gathered frame by frame in four bytes a row.
+
+use std::collections::HashMap;
+use std::hash::Hash;
+
+use super::id::FrameId;
+
+/// Rows by landmark: the landmark, its frames ascending, and the row in each.
+pub type RowsOfLandmark<Id> = (Id, Vec<FrameId>, Vec<i64>);
+
+/// Gathers which landmark each row of a per-frame table shows, and turns that round piece by piece.
+///
+/// Four bytes are kept for each row, so that the correspondences of a sequence too long for memory can
+/// still be written: see [`pieces`](Self::pieces).
+#[derive(Clone, Debug)]
+pub struct LandmarkRows<Id> {
+    places: HashMap<Id, u32>,
+    ids: Vec<Id>,
+    counts: Vec<u64>,
+    rows: Vec<u32>,
+    frames: Vec<(FrameId, usize)>,
+}
+
+impl<Id> Default for LandmarkRows<Id> {
+    fn default() -> Self {
+        Self {
+            places: HashMap::new(),
+            ids: Vec::new(),
+            counts: Vec::new(),
+            rows: Vec::new(),
+            frames: Vec::new(),
+        }
+    }
+}
+
+impl<Id: Copy + Ord + Hash> LandmarkRows<Id> {
+    /// Adds the landmarks of the next rows of the table, which belong to one frame.
+    pub fn push_frame(&mut self, frame_id: FrameId, landmarks: impl IntoIterator<Item = Id>) {
+        for id in landmarks {
+            let place = *self.places.entry(id).or_insert_with(|| {
+                self.ids.push(id);
+                self.counts.push(0);
+                u32::try_from(self.ids.len() - 1).unwrap_or(u32::MAX)
+            });
+            self.counts[place as usize] += 1;
+            self.rows.push(place);
+        }
+        self.frames.push((frame_id, self.rows.len()));
+    }
+
+    /// Rows so far.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Whether there is no row yet.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// Landmarks with their numbers of rows, ascending by landmark.
+    #[must_use]
+    pub fn counts(&self) -> Vec<(Id, u64)> {
+        self.order().into_iter().map(|place| (self.ids[place], self.counts[place])).collect()
+    }
+
+    /// The rows of every landmark, ascending by landmark, in pieces of about `limit` rows.
+    ///
+    /// A landmark is never cut, so one with more rows than `limit` makes a larger piece. Each piece
+    /// costs one pass over all rows.
+    pub fn pieces(&self, limit: u64) -> impl Iterator<Item = Vec<RowsOfLandmark<Id>>> + '_ {
+        let order = self.order();
+        let mut begin = 0;
+        std::iter::from_fn(move || {
+            if begin == order.len() {
+                return None;
+            }
+            let mut end = begin;
+            let mut rows = 0;
+            while end < order.len() && (end == begin || rows + self.counts[order[end]] <= limit) {
+                rows += self.counts[order[end]];
+                end += 1;
+            }
+            let piece = self.piece(&order[begin..end]);
+            begin = end;
+            Some(piece)
+        })
+    }
+
+    /// Places of the landmarks, ascending by landmark.
+    fn order(&self) -> Vec<usize> {
+        let mut order: Vec<usize> = (0..self.ids.len()).collect();
+        order.sort_unstable_by_key(|place| self.ids[*place]);
+        order
+    }
+
+    fn piece(&self, places: &[usize]) -> Vec<RowsOfLandmark<Id>> {
+        const ELSEWHERE: u32 = u32::MAX;
+        let mut slot_of = vec![ELSEWHERE; self.ids.len()];
+        let mut lists: Vec<RowsOfLandmark<Id>> = Vec::with_capacity(places.len());
+        for (slot, place) in (0_u32..).zip(places) {
+            slot_of[*place] = slot;
+            let count = usize::try_from(self.counts[*place]).unwrap_or(0);
+            lists.push((self.ids[*place], Vec::with_capacity(count), Vec::with_capacity(count)));
+        }
+        let mut begin = 0;
+        for (frame_id, end) in &self.frames {
+            for row in begin..*end {
+                let slot = slot_of[self.rows[row] as usize];
+                if slot != ELSEWHERE {
+                    let list = &mut lists[slot as usize];
+                    list.1.push(*frame_id);
+                    list.2.push(i64::try_from(row).unwrap_or(i64::MAX));
+                }
+            }
+            begin = *end;
+        }
+        lists
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn pieces_of_any_size_hold_every_row_once(
+            frames in prop::collection::vec(prop::collection::btree_set(0_i64..20, 0..12), 0..12),
+            limit in 1_u64..40,
+        ) {
+            let mut gathered = LandmarkRows::default();
+            let mut expected: std::collections::BTreeMap<i64, (Vec<FrameId>, Vec<i64>)> = Default::default();
+            let mut row = 0;
+            for (frame, ids) in (0_i64..).zip(&frames) {
+                gathered.push_frame(FrameId(frame), ids.iter().copied());
+                for id in ids {
+                    let list = expected.entry(*id).or_default();
+                    list.0.push(FrameId(frame));
+                    list.1.push(row);
+                    row += 1;
+                }
+            }
+            let whole: Vec<_> = gathered.pieces(u64::MAX).flatten().collect();
+            prop_assert_eq!(&gathered.pieces(limit).flatten().collect::<Vec<_>>(), &whole);
+            let expected: Vec<_> = expected.into_iter().map(|(id, (frames, rows))| (id, frames, rows)).collect();
+            prop_assert_eq!(whole, expected);
+            for piece in gathered.pieces(limit) {
+                let rows: usize = piece.iter().map(|list| list.2.len()).sum();
+                prop_assert!(piece.len() == 1 || rows as u64 <= limit);
+            }
+        }
+    }
+}

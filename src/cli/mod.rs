@@ -10,6 +10,7 @@ mod man;
 mod progress;
 mod schema;
 mod text;
+mod two_pass;
 mod validate;
 
 use std::io::{self, IsTerminal, Write};

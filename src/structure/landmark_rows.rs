@@ -8,6 +8,40 @@ use super::id::FrameId;
 /// Rows by landmark: the landmark, its frames ascending, and the row in each.
 pub type RowsOfLandmark<Id> = (Id, Vec<FrameId>, Vec<i64>);
 
+/// Which rows of a table are kept in another, a bit each.
+#[derive(Clone, Debug, Default)]
+pub struct KeptRows {
+    words: Vec<u64>,
+    len: usize,
+    kept: u64,
+}
+
+impl KeptRows {
+    /// Says whether the next row is kept.
+    pub fn push(&mut self, keep: bool) {
+        if self.len.is_multiple_of(64) {
+            self.words.push(0);
+        }
+        if let Some(word) = self.words.last_mut() {
+            *word |= u64::from(keep) << (self.len % 64);
+        }
+        self.len += 1;
+        self.kept += u64::from(keep);
+    }
+
+    /// Whether a row is kept; no row that was never mentioned is.
+    #[must_use]
+    pub fn get(&self, row: usize) -> bool {
+        self.words.get(row / 64).is_some_and(|word| word >> (row % 64) & 1 == 1)
+    }
+
+    /// How many rows are kept.
+    #[must_use]
+    pub const fn kept(&self) -> u64 {
+        self.kept
+    }
+}
+
 /// Gathers which landmark each row of a per-frame table shows, and turns that round piece by piece.
 ///
 /// Four bytes are kept for each row, so that the correspondences of a sequence too long for memory can
@@ -71,7 +105,30 @@ impl<Id: Copy + Ord + Hash> LandmarkRows<Id> {
     /// A landmark is never cut, so one with more rows than `limit` makes a larger piece. Each piece
     /// costs one pass over all rows.
     pub fn pieces(&self, limit: u64) -> impl Iterator<Item = Vec<RowsOfLandmark<Id>>> + '_ {
-        let order = self.order();
+        self.pieces_where(self.counts.clone(), limit, |_| true)
+    }
+
+    /// As [`pieces`](Self::pieces), of the table that has the kept rows of this one alone, numbered anew.
+    pub fn pieces_of<'a>(
+        &'a self,
+        kept: &'a KeptRows,
+        limit: u64,
+    ) -> impl Iterator<Item = Vec<RowsOfLandmark<Id>>> + 'a {
+        let mut counts = vec![0; self.ids.len()];
+        for (row, place) in self.rows.iter().enumerate() {
+            counts[*place as usize] += u64::from(kept.get(row));
+        }
+        self.pieces_where(counts, limit, |row| kept.get(row))
+    }
+
+    fn pieces_where<'a>(
+        &'a self,
+        counts: Vec<u64>,
+        limit: u64,
+        keep: impl Fn(usize) -> bool + 'a,
+    ) -> impl Iterator<Item = Vec<RowsOfLandmark<Id>>> + 'a {
+        let mut order = self.order();
+        order.retain(|place| counts[*place] > 0);
         let mut begin = 0;
         std::iter::from_fn(move || {
             if begin == order.len() {
@@ -79,11 +136,11 @@ impl<Id: Copy + Ord + Hash> LandmarkRows<Id> {
             }
             let mut end = begin;
             let mut rows = 0;
-            while end < order.len() && (end == begin || rows + self.counts[order[end]] <= limit) {
-                rows += self.counts[order[end]];
+            while end < order.len() && (end == begin || rows + counts[order[end]] <= limit) {
+                rows += counts[order[end]];
                 end += 1;
             }
-            let piece = self.piece(&order[begin..end]);
+            let piece = self.piece(&order[begin..end], &counts, &keep);
             begin = end;
             Some(piece)
         })
@@ -96,24 +153,34 @@ impl<Id: Copy + Ord + Hash> LandmarkRows<Id> {
         order
     }
 
-    fn piece(&self, places: &[usize]) -> Vec<RowsOfLandmark<Id>> {
+    fn piece(
+        &self,
+        places: &[usize],
+        counts: &[u64],
+        keep: &impl Fn(usize) -> bool,
+    ) -> Vec<RowsOfLandmark<Id>> {
         const ELSEWHERE: u32 = u32::MAX;
         let mut slot_of = vec![ELSEWHERE; self.ids.len()];
         let mut lists: Vec<RowsOfLandmark<Id>> = Vec::with_capacity(places.len());
         for (slot, place) in (0_u32..).zip(places) {
             slot_of[*place] = slot;
-            let count = usize::try_from(self.counts[*place]).unwrap_or(0);
+            let count = usize::try_from(counts[*place]).unwrap_or(0);
             lists.push((self.ids[*place], Vec::with_capacity(count), Vec::with_capacity(count)));
         }
         let mut begin = 0;
+        let mut number = 0;
         for (frame_id, end) in &self.frames {
             for row in begin..*end {
+                if !keep(row) {
+                    continue;
+                }
                 let slot = slot_of[self.rows[row] as usize];
                 if slot != ELSEWHERE {
                     let list = &mut lists[slot as usize];
                     list.1.push(*frame_id);
-                    list.2.push(i64::try_from(row).unwrap_or(i64::MAX));
+                    list.2.push(number);
                 }
+                number += 1;
             }
             begin = *end;
         }
@@ -152,6 +219,23 @@ mod tests {
                 let rows: usize = piece.iter().map(|list| list.2.len()).sum();
                 prop_assert!(piece.len() == 1 || rows as u64 <= limit);
             }
+        }
+
+        #[test]
+        fn kept_rows_are_those_of_a_table_that_has_them_alone(
+            frames in prop::collection::vec(prop::collection::btree_map(0_i64..20, any::<bool>(), 0..12), 0..12),
+            limit in 1_u64..40,
+        ) {
+            let (mut all, mut alone, mut kept) =
+                (LandmarkRows::default(), LandmarkRows::default(), KeptRows::default());
+            for (frame, rows) in (0_i64..).zip(&frames) {
+                all.push_frame(FrameId(frame), rows.keys().copied());
+                alone.push_frame(FrameId(frame), rows.iter().filter(|row| *row.1).map(|row| *row.0));
+                rows.values().for_each(|keep| kept.push(*keep));
+            }
+            prop_assert_eq!(kept.kept(), alone.len() as u64);
+            let found: Vec<_> = all.pieces_of(&kept, limit).collect();
+            prop_assert_eq!(found, alone.pieces(limit).collect::<Vec<_>>());
         }
     }
 }

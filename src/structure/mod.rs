@@ -41,7 +41,7 @@ pub use frame_statistics::FrameStatistics;
 pub use graph::{GraphFactor, GraphLine, GraphPoint, GraphPose};
 pub use id::{CameraId, FrameId, GroupId, LineId, PointId};
 pub use landmark::{Descriptor, LineLandmark, PointLandmark};
-pub use landmark_rows::{LandmarkRows, RowsOfLandmark};
+pub use landmark_rows::{KeptRows, LandmarkRows, RowsOfLandmark};
 pub use manifest::{Clock, Conventions, Manifest, Noise, TableSummary};
 pub use map::{MapLine, MapPoint};
 pub use measurement::{LineMeasurement, PointMeasurement};

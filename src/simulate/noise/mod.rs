@@ -1,1 +1,14 @@
-//! From observations to measurements.
+//! Noise: observations in, measurements out.
+//!
+//! The registry of the specification (section 4) has the formulas; each is written once more here, as code.
+
+mod depth;
+mod measure;
+mod model;
+mod recipe;
+
+#[cfg(test)]
+mod tests;
+
+pub use model::NoiseModel;
+pub use recipe::NoiseRecipe;

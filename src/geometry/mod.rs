@@ -40,6 +40,7 @@ mod triangulate_line;
 mod triangulate_point;
 
 pub use camera::PinholeCamera;
+pub use direction::angle as angle_between;
 pub use error::Error;
 pub use line_fit::{LineFit, fit_line};
 pub use line_residual::line_residual;

@@ -17,6 +17,7 @@ mod landmark_rows;
 mod manifest;
 mod map;
 mod measurement;
+mod motion_grade;
 mod observation;
 mod pose_row;
 mod provenance;
@@ -28,6 +29,7 @@ mod statistics;
 mod structural_group;
 mod table;
 mod trajectory;
+mod trajectory_file;
 
 pub use camera::{Camera, Distortion};
 pub use column::{Bitmap, ColumnSink, ColumnSource, ColumnValue, Lists, Nullable};
@@ -45,6 +47,7 @@ pub use landmark_rows::{KeptRows, LandmarkRows, RowsOfLandmark};
 pub use manifest::{Clock, Conventions, Manifest, Noise, TableSummary};
 pub use map::{MapLine, MapPoint};
 pub use measurement::{LineMeasurement, PointMeasurement};
+pub use motion_grade::{MotionGrade, grade_of, typical_rotation};
 pub use observation::{LineObservation, PointObservation};
 pub use pose_row::PoseRow;
 pub use provenance::{Exclusion, Generator, Recovery, Source, SourceFile};
@@ -55,3 +58,7 @@ pub use structural_group::StructuralGroup;
 pub use table::{TABLES, table_info};
 pub(crate) use table::{for_each_frame_table, for_each_table};
 pub use trajectory::TrajectoryPose;
+pub use trajectory_file::{
+    LARGEST_TRAJECTORY_FILE_BYTES, MOST_TRAJECTORY_ROWS, TrajectoryFileError, TrajectoryFormat,
+    TrajectoryRow, read_trajectory, write_trajectory,
+};

@@ -40,13 +40,18 @@ impl<'a, C: Curve> ArcLength<'a, C> {
         }
         let rest = wanted - before;
         let mut t = low + (high - low) * (rest / (after - before)).min(1.0);
-        // Newton's steps; the speed hardly changes within a cell.
-        for _ in 0..3 {
+        // Newton's steps: two or three, and more beside a cusp, where the speed is nearly zero.
+        for _ in 0..16 {
             let speed = self.curve.at(t).1.norm();
             if speed <= 0.0 {
                 break;
             }
-            t = (t - (piece(self.curve, low, t) - rest) / speed).clamp(low, high);
+            let better = (t - (piece(self.curve, low, t) - rest) / speed).clamp(low, high);
+            let moved = (better - t).abs();
+            t = better;
+            if moved < 1e-15 {
+                break;
+            }
         }
         t
     }

@@ -100,14 +100,14 @@ impl Corridor {
         // The corner at which a leg ends and about which a quarter circle goes.
         let corner = [(half_x, half_y), (-half_x, half_y), (-half_x, -half_y), (half_x, -half_y)][side];
         let start = side as f64 * FRAC_PI_2;
-        if piece % 2 == 0 {
+        if piece.is_multiple_of(2) {
             let (ahead, out) = [
                 ((0.0, 1.0), (1.0, 0.0)),
                 ((-1.0, 0.0), (0.0, 1.0)),
                 ((0.0, -1.0), (-1.0, 0.0)),
                 ((1.0, 0.0), (0.0, -1.0)),
             ][side];
-            let back = 2.0 * if side % 2 == 0 { half_y } else { half_x } * (1.0 - done);
+            let back = 2.0 * if side.is_multiple_of(2) { half_y } else { half_x } * (1.0 - done);
             let offset = Vector3::new(
                 corner.0 + radius * out.0 - back * ahead.0,
                 corner.1 + radius * out.1 - back * ahead.1,

@@ -51,7 +51,7 @@ pub(super) fn rotation_of(poses: &[Pose]) -> Option<f64> {
 /// The number of frames with which a path's typical rotation is nearest to that of a grade.
 ///
 /// The rotation falls as frames are added: as 1/N, and on a sphere's even spiral as 1/√N. Each step scales the number
-/// by how far the rotation was off.
+/// by how far the rotation was off, to the power that the two steps before it suggest.
 fn frames_for(path: &impl Path, grade: MotionGrade) -> Result<usize, Error> {
     let wanted = grade.rotation_rad();
     let refused = |found: String| {
@@ -59,6 +59,7 @@ fn frames_for(path: &impl Path, grade: MotionGrade) -> Result<usize, Error> {
     };
     let mut frames = path.fewest().max(1000);
     let mut best: Option<(f64, usize, f64)> = None;
+    let mut before: Option<(usize, f64)> = None;
     for _ in 0..16 {
         let Some(rotation) = rotation_of(&path.walk(frames)?) else {
             break;
@@ -67,10 +68,15 @@ fn frames_for(path: &impl Path, grade: MotionGrade) -> Result<usize, Error> {
         if best.is_none_or(|(least, ..)| off < least) {
             best = Some((off, frames, rotation));
         }
-        let next = scaled(frames, rotation / wanted).clamp(path.fewest(), MOST_FRAMES);
+        let power = before.map_or(1.0, |(fewer, faster)| {
+            let power = libm::log(frames as f64 / fewer as f64) / libm::log(faster / rotation);
+            if power.is_finite() { power.clamp(0.5, 3.0) } else { 1.0 }
+        });
+        let next = scaled(frames, libm::pow(rotation / wanted, power)).clamp(path.fewest(), MOST_FRAMES);
         if off < 1.002 || next == frames {
             break;
         }
+        before = Some((frames, rotation));
         frames = next;
     }
     match best {

@@ -18,13 +18,16 @@ use crate::structure::MotionGrade;
 const MARGIN: f64 = 1e-6;
 
 /// A part of the speed bound below which the camera does not slow down to turn; it then turns after the path instead.
-const SLOWEST: f64 = 0.01;
+const SLOWEST: f64 = 0.1;
+
+/// The radius of a bend of the path, as a part of the box's longest side, that most of its bends are narrower than.
+const BEND: f64 = 0.3;
 
 /// A uniform cubic B-spline through random control points in a box, walked within bounds.
 ///
 /// From frame to frame the camera goes as far as both bounds allow: it moves at `max_speed_m_s` where the path is
 /// nearly straight, and slows down in curves so that it turns by `max_turn_rate_deg_s`. Where that would take less
-/// than a hundredth of the speed, as at a cusp, it moves at that hundredth and its view follows as fast as it may. The
+/// than a tenth of the speed, as at a cusp, it moves at that tenth and its view follows as fast as it may. The
 /// bounds hold for every two consecutive frames: for the distance, and for the angle of the whole rotation. No frame
 /// takes more than half a piece of the spline, so that short pieces are not jumped over.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -33,16 +36,18 @@ pub struct RandomSpline {
     /// Number of frames; must be given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frames: Option<u64>,
-    /// Grade of rotation: sets the bound on the turn rate to the grade's rotation a frame (slow 0.5, medium 2, sharp 10
-    /// degrees), instead of `max_turn_rate_deg_s`. The speed must be high enough for the path to use it.
+    /// Grade of rotation: bounds the turn rate by the grade's rotation a frame (slow 0.5, medium 2, sharp 10 degrees),
+    /// instead of `max_turn_rate_deg_s`, and unless `max_speed_m_s` is given makes the path fast enough to reach it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub motion: Option<MotionGrade>,
     /// Lowest corner of the box, metres.
     pub low_m: [f64; 3],
     /// Highest corner of the box, metres.
     pub high_m: [f64; 3],
-    /// Bound on the speed, metres a second.
-    pub max_speed_m_s: f64,
+    /// Bound on the speed, metres a second. Without it 1 m/s; with `motion` the turn rate (radians a second) times 0.3 of
+    /// the box's longest side.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_speed_m_s: Option<f64>,
     /// Bound on the turn rate, degrees a second; 60 without it and `motion`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_turn_rate_deg_s: Option<f64>,
@@ -65,7 +70,7 @@ impl Default for RandomSpline {
             motion: None,
             low_m: [-3.0, -3.0, -0.5],
             high_m: [3.0, 3.0, 0.5],
-            max_speed_m_s: 1.0,
+            max_speed_m_s: None,
             max_turn_rate_deg_s: None,
             max_pitch_deg: 30.0,
             look: Look::Forward,
@@ -79,7 +84,7 @@ impl Default for RandomSpline {
 impl RandomSpline {
     /// The poses of a seed.
     pub(super) fn poses(&self, rate_hz: f64, seed: u64) -> Result<Vec<Pose>, Error> {
-        let (frames, turn_rate) = self.check(rate_hz)?;
+        let (frames, speed, turn_rate) = self.check(rate_hz)?;
         let mut walker = Walker {
             curve: ControlPoints::new(seed, self.low_m, self.high_m),
             mount: Mount::from_degrees(self.yaw_deg, self.pitch_deg, self.roll_deg),
@@ -96,15 +101,15 @@ impl RandomSpline {
         for n in 1..frames {
             let seconds =
                 (stamp_nanos(n, rate_hz) - stamp_nanos(n - 1, rate_hz)) as f64 * 1e-9 * (1.0 - MARGIN);
-            let bounds = Bounds { distance: self.max_speed_m_s * seconds, angle: turn_rate * seconds };
+            let bounds = Bounds { distance: speed * seconds, angle: turn_rate * seconds };
             pose = walker.next(&pose, &bounds)?;
             poses.push(pose);
         }
         Ok(poses)
     }
 
-    /// The number of frames and the turn rate, radians a second.
-    fn check(&self, rate_hz: f64) -> Result<(usize, f64), Error> {
+    /// The number of frames, and the bounds on speed, metres a second, and turn rate, radians a second.
+    fn check(&self, rate_hz: f64) -> Result<(usize, f64, f64), Error> {
         let frames =
             self.frames.ok_or_else(|| Error::value("trajectory.frames", "a number of frames", "none"))?;
         let frames = frame_count(frames, 1)?;
@@ -115,7 +120,7 @@ impl RandomSpline {
             let expected = "a corner above `low_m`, at least a millimetre along one axis";
             return Err(Error::value("trajectory.high_m", expected, format!("{:?}", self.high_m)));
         }
-        within("trajectory.max_speed_m_s", self.max_speed_m_s, 1e-3, 1e6)?;
+        self.max_speed_m_s.map_or(Ok(()), |speed| within("trajectory.max_speed_m_s", speed, 1e-3, 1e6))?;
         within("trajectory.max_pitch_deg", self.max_pitch_deg, 0.0, 89.0)?;
         self.look.check()?;
         angle("trajectory.yaw_deg", self.yaw_deg)?;
@@ -133,7 +138,12 @@ impl RandomSpline {
                 rate.to_radians()
             }
         };
-        Ok((frames, turn_rate))
+        let speed = match (self.max_speed_m_s, self.motion) {
+            (Some(speed), _) => speed,
+            (None, None) => 1.0,
+            (None, Some(_)) => BEND * sides.max() * turn_rate,
+        };
+        Ok((frames, speed, turn_rate))
     }
 }
 

@@ -7,7 +7,7 @@ use std::f64::consts::{PI, TAU};
 
 use super::arc_length::{ArcLength, Curve};
 use super::attitude::Mount;
-use super::bounds::{LONGEST_M, angle, point};
+use super::bounds::{angle, point};
 use super::cubic_spline::CubicSpline;
 use super::look::{Look, WaypointLook};
 use super::path::Path;
@@ -17,6 +17,9 @@ use crate::structure::MotionGrade;
 
 /// The most waypoints of a path.
 const MOST: usize = 100_000;
+
+/// The least distance between waypoints, metres.
+const NEAREST_M: f64 = 1e-6;
 
 /// Cells in which a piece of the spline is measured; its length is then exact to about 1e-6 of itself.
 const CELLS_A_PIECE: usize = 32;
@@ -104,7 +107,7 @@ impl Path for Waypoints {
                 None => break,
                 Some(next) => next,
             };
-            if distance(waypoint, next) < LONGEST_M * 1e-12 {
+            if distance(waypoint, next) < NEAREST_M {
                 let found = "the same as the waypoint after it";
                 return Err(Error::value(place("position_m"), "a position of its own", found));
             }

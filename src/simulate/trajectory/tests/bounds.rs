@@ -1,12 +1,18 @@
 //! The bounds of the random path, and what no trajectory may ask for.
 
 use super::*;
-use crate::structure::MotionGrade;
+use crate::structure::{MotionGrade, grade_of, typical_rotation};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
 /// Holds every pair of frames to the bounds, and gives the parts of them that pairs use: speed, turn rate.
-fn parts_used(spline: &RandomSpline, rate: f64, seed: u64, turn_rate_deg_s: f64) -> Vec<(f64, f64)> {
+fn parts_used(
+    spline: &RandomSpline,
+    rate: f64,
+    seed: u64,
+    speed_m_s: f64,
+    turn_rate_deg_s: f64,
+) -> Vec<(f64, f64)> {
     let poses = Trajectory::Random(spline.clone()).poses(rate, seed, FilePath::new("")).unwrap();
     assert_eq!(poses.len() as u64, spline.frames.unwrap());
     let (low, high) = (Vector3::from(spline.low_m), Vector3::from(spline.high_m));
@@ -20,7 +26,7 @@ fn parts_used(spline: &RandomSpline, rate: f64, seed: u64, turn_rate_deg_s: f64)
         .map(|pair| {
             let seconds = (pair[1].stamp_nanos - pair[0].stamp_nanos) as f64 * 1e-9;
             let (a, b) = (pair[0].world_from_camera, pair[1].world_from_camera);
-            let speed = distance(&a, &b) / seconds / spline.max_speed_m_s;
+            let speed = distance(&a, &b) / seconds / speed_m_s;
             let turning = turn(&a, &b).to_degrees() / seconds / turn_rate_deg_s;
             assert!(speed <= 1.0 && turning <= 1.0, "seed {seed}: {speed} {turning}");
             (speed, turning)
@@ -46,12 +52,12 @@ proptest! {
             frames: Some(400),
             low_m: half.map(|half| -half),
             high_m: half,
-            max_speed_m_s,
+            max_speed_m_s: Some(max_speed_m_s),
             max_turn_rate_deg_s: Some(turn_rate),
             look,
             ..RandomSpline::default()
         };
-        parts_used(&spline, rate, seed, turn_rate);
+        parts_used(&spline, rate, seed, max_speed_m_s, turn_rate);
     }
 
     #[test]
@@ -61,17 +67,28 @@ proptest! {
             max_turn_rate_deg_s: Some(turn_rate),
             ..RandomSpline::default()
         };
-        let used = parts_used(&spline, 30.0, seed, turn_rate);
+        let used = parts_used(&spline, 30.0, seed, 1.0, turn_rate);
         let idle = used.iter().filter(|(speed, turning)| speed.max(*turning) < 0.95).count();
         // The first steps, and those at cusps, may be shorter.
         prop_assert!(idle < 50, "{idle} of 999 steps use neither bound");
     }
 
     #[test]
-    fn motion_bounds_the_rotation_of_each_step(seed: u64) {
+    fn motion_makes_a_random_path_that_has_the_grade(
+        seed: u64,
+        rate in 1.0..100.0_f64,
+        half in prop::array::uniform3(0.1..10.0_f64),
+    ) {
         for grade in [MotionGrade::Slow, MotionGrade::Medium, MotionGrade::Sharp] {
-            let spline = RandomSpline { frames: Some(200), motion: Some(grade), ..RandomSpline::default() };
-            parts_used(&spline, 30.0, seed, grade.rotation_rad().to_degrees() * 30.0);
+            let (low_m, high_m) = (half.map(|half| -half), half);
+            let spline =
+                RandomSpline { frames: Some(500), motion: Some(grade), low_m, high_m, ..RandomSpline::default() };
+            let poses = Trajectory::Random(spline).poses(rate, seed, FilePath::new("")).unwrap();
+            let turns: Vec<_> = pairs(&poses).map(|(a, b)| turn(&a, &b)).collect();
+            // Stamps are rounded to the nanosecond, 1e-7 of the shortest time between frames.
+            prop_assert!(turns.iter().all(|turn| *turn <= grade.rotation_rad() * (1.0 + 1e-7)));
+            let typical = typical_rotation(turns).unwrap();
+            prop_assert_eq!(grade_of(typical), grade, "{} degrees", typical.to_degrees());
         }
     }
 }

@@ -47,14 +47,12 @@ pub fn read_trajectory(
             format = Some(TrajectoryFormat::Euroc);
             continue;
         }
-        let row = match format {
-            Some(format) => parse(format, line, text)?,
-            None => {
-                let guessed = guess(line, text)?;
-                format = Some(guessed);
-                parse(guessed, line, text)?
-            }
+        let known = match format {
+            Some(format) => format,
+            None => guess(line, text)?,
         };
+        format = Some(known);
+        let row = parse(known, line, text)?;
         if let Some((before, stamp)) = rows.last().and_then(|row| row.stamp_nanos).zip(row.stamp_nanos)
             && stamp <= before
         {
@@ -158,7 +156,8 @@ fn quaternion_row(line: usize, texts: [&str; 7], xyzw: [usize; 4]) -> Result<Pos
     let found = numbers(line, texts)?;
     let rotation_xyzw = xyzw.map(|at| found[at]);
     let norm = Vector4::from(rotation_xyzw).norm();
-    if !((norm - 1.0).abs() <= NORM_TOLERANCE) {
+    // Infinite for numbers whose squares overflow.
+    if (norm - 1.0).abs() > NORM_TOLERANCE {
         return Err(TrajectoryFileError::content(line, "a quaternion of norm 1", format!("norm {norm}")));
     }
     Ok(PoseRow { translation: [found[0], found[1], found[2]], rotation_xyzw })

@@ -187,3 +187,33 @@ fn what_could_not_be_read_back_is_not_written() {
         }
     }
 }
+
+/// Looked for in `../shared/data` beside the workspace, or where `OPEN_STRUCTURE_DATA` says.
+#[test]
+fn trajectories_of_the_tum_benchmark_are_read() {
+    let data = std::env::var_os("OPEN_STRUCTURE_DATA").map_or_else(
+        || std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
+        std::path::PathBuf::from,
+    );
+    for name in [
+        "trajectories/freiburg1_xyz-groundtruth.txt",
+        "trajectories/freiburg1_xyz-ORB_kf_mono.txt",
+        "trajectories/freiburg1_xyz-rgbdslam.txt",
+        "rgbd/rgbd_dataset_freiburg1_desk_9/groundtruth.txt",
+    ] {
+        let Ok(text) = std::fs::read_to_string(data.join(name)) else {
+            eprintln!("SKIPPED: {name} is not here (see OPEN_STRUCTURE_DATA)");
+            continue;
+        };
+        let rows = read(&text).unwrap();
+        let written = text.lines().filter(|line| !line.trim().is_empty() && !line.starts_with('#'));
+        assert_eq!(rows.len(), written.clone().count(), "{name}");
+        for (row, line) in rows.iter().zip(written) {
+            let numbers: Vec<f64> =
+                line.split_ascii_whitespace().map(|number| number.parse().unwrap()).collect();
+            assert_eq!(row.pose.numbers().as_slice(), &numbers[1..], "{name} line {}", row.line);
+            // An f64 of seconds is exact to 240 ns.
+            assert!((row.stamp_nanos.unwrap() as f64 * 1e-9 - numbers[0]).abs() < 1e-6);
+        }
+    }
+}

@@ -103,7 +103,16 @@ fn observed() -> Sequence {
     for id in 0..3 {
         let segment = sequence.line_landmarks[id].segment();
         for estimate in ["point-line-ba", "unrefined"] {
-            sequence.map_lines.push(MapLine::new(estimate.to_owned(), LineId(id as i64), &segment));
+            sequence.map_lines.push(MapLine {
+                estimate: estimate.to_owned(),
+                line_id: LineId(id as i64),
+                start_x: segment.start.x,
+                start_y: segment.start.y,
+                start_z: segment.start.z,
+                end_x: segment.end.x,
+                end_y: segment.end.y,
+                end_z: segment.end.z,
+            });
         }
     }
     sequence.point_correspondences = point_correspondences(&[], &sequence.point_observations);

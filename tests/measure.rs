@@ -79,14 +79,14 @@ fn observed() -> Sequence {
         sequence.trajectories.push(TrajectoryPose::new("map-to-frame".to_owned(), frame_id, pose));
         let camera_from_world = world_from_camera.inverse();
         for landmark in &sequence.point_landmarks {
-            let seen = &camera_from_world * landmark.position();
+            let seen = camera_from_world * landmark.position();
             let pixel = CAMERA.project(seen).unwrap();
             let (point_id, depth) = (landmark.point_id, Some(seen.z));
             let row = PointObservation { frame_id, point_id, u: pixel.x, v: pixel.y, depth };
             sequence.point_observations.push(row);
         }
         for landmark in &sequence.line_landmarks {
-            let ends = [landmark.segment().start, landmark.segment().end].map(|end| &camera_from_world * end);
+            let ends = [landmark.segment().start, landmark.segment().end].map(|end| camera_from_world * end);
             let [start, end] = ends.map(|end| CAMERA.project(end).unwrap());
             sequence.line_observations.push(LineObservation {
                 frame_id,

@@ -41,6 +41,7 @@ Examples:
   os measure box1 -o noisy.mcap --noise gaussian --seed 7 --set sigma_px=0.5
   os measure box1.mcap -o kinect/ --noise kinect-disparity --quantise 1 --outliers 0.05
   os measure box1.mcap -o runs/box1.mcap --noise paper --seeds 0..9")]
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag of the command line")]
 pub(super) struct Args {
     /// Sequence with observations: an MCAP file or a Parquet folder.
     sequence: PathBuf,
@@ -172,7 +173,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     }
     let mut realisations = begin(args, &recipe, &reader, &outputs)?;
     let seeds: Vec<u64> = outputs.iter().map(|(seed, _)| *seed).collect();
-    write_realisations(&mut realisations, frames.len(), || Ok(chunks(&reader, &recipe, &seeds)?))?;
+    write_realisations(&mut realisations, frames.len(), || chunks(&reader, &recipe, &seeds))?;
     for (realisation, (_, path)) in realisations.into_iter().zip(&outputs) {
         let [points, lines] = realisation.tally.measurements();
         let lost = realisation.tally.lost_depths();

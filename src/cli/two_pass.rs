@@ -85,10 +85,10 @@ where
             Ok(())
         })?;
         // Statistics of measurements that did not come are made again, of observations.
-        if outputs.iter_mut().filter_map(|output| output.tally.begin_again(&observed)).count() == 0 {
+        if outputs.iter().all(|output| output.tally.is_as_expected(&observed)) {
             break observed;
         }
-        outputs.iter_mut().for_each(|output| output.tally.clear());
+        outputs.iter_mut().for_each(|output| output.tally.begin_again());
     };
     outputs.par_iter_mut().try_for_each(|output| output.tally.write(&observed, &mut output.writer))?;
     drop(observed);
@@ -232,16 +232,16 @@ impl Tally {
         Ok(())
     }
 
-    /// Expects what was found where that is something else; then statistics have to be made again.
-    fn begin_again(&mut self, observed: &Observed) -> Option<()> {
-        let found = self.measurements().map(|count| count > 0);
+    /// Whether measurements came where they were expected; else statistics have to be made again.
+    fn is_as_expected(&self, observed: &Observed) -> bool {
         let seen = [!observed.points.is_empty(), !observed.lines.is_empty()];
-        let wrong = (0..2).any(|kind| seen[kind] && found[kind] != self.expected[kind]);
-        wrong.then(|| self.expected = found)
+        (0..2).all(|kind| !seen[kind] || (self.measurements()[kind] > 0) == self.expected[kind])
     }
 
-    fn clear(&mut self) {
-        *self = Self::new(&self.groups, &self.cameras, self.expected);
+    /// Forgets everything but which measurements came: they are expected now.
+    fn begin_again(&mut self) {
+        let expected = self.measurements().map(|count| count > 0);
+        *self = Self::new(&self.groups, &self.cameras, expected);
     }
 
     /// Writes correspondences and statistics.

@@ -289,3 +289,86 @@ fn keep<Id: PartialEq>(
     }
     measured.next().map_or(Ok(lost), |(id, _)| Err(id))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::format;
+    use crate::structure::{
+        CameraId, FrameId, Noise, Sequence, frame_statistics, line_correspondences, point_correspondences,
+    };
+
+    /// Frames that see points, of which every third is not measured.
+    fn sequence(measured: bool) -> Sequence {
+        let mut sequence = Sequence::default();
+        for id in 0..7 {
+            let frame_id = FrameId(id);
+            sequence.frames.push(Frame::new(frame_id, id, CameraId(0), None));
+            for point in 0..5 {
+                let (point_id, u, v) = (PointId(point), 3.0 * point as f64, id as f64);
+                sequence.point_observations.push(PointObservation {
+                    frame_id,
+                    point_id,
+                    u,
+                    v,
+                    depth: Some(1.0),
+                });
+                if measured && (point + id) % 3 != 0 {
+                    let row = PointMeasurement { frame_id, point_id, u: u + 40.0, v, depth: None };
+                    sequence.point_measurements.push(row);
+                }
+            }
+        }
+        sequence.point_correspondences =
+            point_correspondences(&sequence.point_measurements, &sequence.point_observations);
+        sequence.line_correspondences = line_correspondences(&[], &[]);
+        sequence.frame_statistics = frame_statistics(&sequence);
+        sequence
+    }
+
+    fn write(sequence: &Sequence, output: &Path) -> anyhow::Result<Written> {
+        let bundles = || Ok(sequence.bundles().map(Ok));
+        let (manifest, frames) = (&sequence.manifest, &sequence.frames);
+        write_two_pass(output, manifest, frames, WriteOptions::default(), &[], |_| Ok(()), bundles)
+    }
+
+    #[test]
+    fn what_follows_from_the_frames_is_as_from_the_whole_sequence_whatever_was_expected() {
+        let folder = tempfile::tempdir().unwrap();
+        for (index, (measured, declared)) in
+            [(true, true), (true, false), (false, true), (false, false)].into_iter().enumerate()
+        {
+            let mut sequence = sequence(measured);
+            let noise = Noise { model: "gaussian".to_owned(), seed: None, parameters: [].into() };
+            sequence.manifest.noise = declared.then_some(noise);
+            let output = folder.path().join(index.to_string());
+            write(&sequence, &output).unwrap();
+            let mut found = format::read(&output).unwrap();
+            found.manifest.tables.clear();
+            assert_eq!(found, sequence, "{measured} {declared}");
+        }
+    }
+
+    #[test]
+    fn what_is_measured_without_being_observed_is_refused_and_nothing_is_left() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut sequence = sequence(true);
+        sequence.point_observations.retain(|row| (row.frame_id, row.point_id) != (FrameId(3), PointId(4)));
+        let error = write(&sequence, &folder.path().join("out")).unwrap_err().to_string();
+        assert_eq!(error, "frame 3: point 4 is measured without being observed");
+        assert_eq!(folder.path().read_dir().unwrap().count(), 0);
+    }
+
+    #[test]
+    fn a_maker_that_fails_is_heard() {
+        let folder = tempfile::tempdir().unwrap();
+        let sequence = sequence(true);
+        let failing = || Ok(sequence.bundles().take(3).map(Ok).chain([Err(anyhow::anyhow!("no more"))]));
+        let output = folder.path().join("out");
+        let (manifest, frames) = (&sequence.manifest, &sequence.frames);
+        let result =
+            write_two_pass(&output, manifest, frames, WriteOptions::default(), &[], |_| Ok(()), failing);
+        assert_eq!(result.unwrap_err().to_string(), "no more");
+        assert_eq!(folder.path().read_dir().unwrap().count(), 0);
+    }
+}

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 
 use super::progress::Progress;
-use super::{Outcome, text};
+use super::{Outcome, left_behind, text};
 use crate::format::{self, Encoding, WriteOptions};
 
 /// Copy a sequence, from one encoding into the other or into the same.
@@ -40,22 +40,8 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     if args.output.exists() && args.output.canonicalize()? == args.sequence.canonicalize()? {
         anyhow::bail!("{}: is the input itself", args.output.display());
     }
-    let mut outcome = Outcome::Done;
+    let mut outcome = left_behind::warn(&reader)?;
     let mut stderr = io::stderr();
-    for name in reader.passed_over() {
-        writeln!(stderr, "warning: {name} is not known to this version and is not copied")?;
-        outcome = Outcome::Findings;
-    }
-    for stored in reader.tables() {
-        for column in &stored.unknown_columns {
-            writeln!(
-                stderr,
-                "warning: column {column} of {} is not known to this version and is not copied",
-                stored.table.name
-            )?;
-            outcome = Outcome::Findings;
-        }
-    }
     let progress = Progress::new("copying", "frames");
     let options = WriteOptions { force: args.force, foxglove: args.foxglove, ..WriteOptions::default() };
     let written = format::copy(&reader, &args.output, options, &|done, total| progress.update(done, total))?;

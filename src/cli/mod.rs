@@ -6,7 +6,9 @@ mod convert;
 mod copy;
 mod explain;
 mod info;
+mod left_behind;
 mod man;
+mod measure;
 mod progress;
 mod schema;
 mod text;
@@ -42,6 +44,7 @@ enum Command {
     Info(info::Args),
     Cat(cat::Args),
     Copy(copy::Args),
+    Measure(measure::Args),
     Schema(schema::Args),
     Convert(convert::Args),
     Completions(completions::Args),
@@ -75,6 +78,7 @@ pub fn main() -> ExitCode {
         Command::Info(args) => info::run(args, &mut stdout),
         Command::Cat(args) => cat::run(args, &mut stdout),
         Command::Copy(args) => copy::run(args, &mut stdout),
+        Command::Measure(args) => measure::run(args, &mut stdout),
         Command::Schema(args) => schema::run(args, &mut stdout),
         Command::Convert(args) => convert::run(args),
         Command::Completions(args) => completions::run(args, &mut stdout),

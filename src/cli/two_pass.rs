@@ -5,6 +5,10 @@
 //! for its measurement.
 
 use std::path::Path;
+use std::sync::mpsc::sync_channel;
+use std::thread;
+
+use rayon::prelude::*;
 
 use super::progress::Progress;
 use crate::format::{FrameRows, SequenceWriter, WriteOptions, Written};
@@ -17,16 +21,23 @@ use crate::structure::{
 /// Rows of correspondences that are turned round at once; each such piece costs a pass over all rows.
 const PIECE_ROWS: u64 = 1 << 22;
 
+/// Frames that were made and wait to be taken: more would only cost memory.
+const WAITING: usize = 4;
+
+/// The next frames of every output: a list for each.
+pub(super) type Chunk = Vec<Vec<FrameBundle>>;
+
 /// Writes a sequence, its frames made twice by `make`: with correspondences, statistics and frames.
 ///
 /// * `manifest`, `frames`, `options` — as for [`SequenceWriter::create`]; a manifest that declares noise makes
 ///   measurements expected, which saves a pass.
 /// * `groups` — the structural groups, for the statistics; `whole` writes them.
 /// * `whole` — writes the other tables of the whole sequence: landmarks, groups, estimates; called once.
-/// * `make` — gives the frames in the order of the table `frames`, the same at every call. Measured
-///   landmarks are among the observed ones, and rows are in key order.
+/// * `make` — gives the frames in the order of the table `frames`, the same at every call, in a thread of its
+///   own. Measured landmarks are among the observed ones, and rows are in key order.
 ///
 /// Nothing is left behind where anything fails.
+#[allow(dead_code, reason = "written for the commands that make one sequence")]
 pub(super) fn write_two_pass<I>(
     output: &Path,
     manifest: &Manifest,
@@ -34,96 +45,186 @@ pub(super) fn write_two_pass<I>(
     options: WriteOptions,
     groups: &[StructuralGroup],
     whole: impl FnOnce(&mut SequenceWriter) -> anyhow::Result<()>,
-    make: impl Fn() -> anyhow::Result<I>,
+    make: impl Fn() -> anyhow::Result<I> + Sync,
 ) -> anyhow::Result<Written>
 where
     I: Iterator<Item = anyhow::Result<FrameBundle>>,
 {
     let mut writer = SequenceWriter::create(output, manifest, frames, options)?;
     whole(&mut writer)?;
-    let total = frames.len() as u64;
-    let mut expected = [manifest.noise.is_some(); 2];
-    let (observed, tally) = loop {
-        let progress = Progress::new("counting", "frames");
-        let (mut observed, mut tally) =
-            (Observed::default(), Tally::new(groups, &manifest.cameras, expected));
-        for (done, bundle) in (1..).zip(make()?) {
-            let bundle = bundle?;
-            observed.add(&bundle);
-            tally.add(bundle)?;
-            progress.update(done, total);
-        }
-        match tally.unexpected(&observed) {
-            Some(found) => expected = found,
-            None => break (observed, tally),
-        }
-    };
-    tally.write(&observed, &mut writer)?;
-    drop((observed, tally));
-    let progress = Progress::new("writing", "frames");
-    for (done, bundle) in (1..).zip(make()?) {
-        let bundle = bundle?;
-        writer.append_frame(bundle.frame.frame_id, FrameRows::from(&bundle))?;
-        progress.update(done, total);
-    }
-    Ok(writer.finish()?)
+    let mut outputs = vec![Realisation::new(writer, manifest, groups)];
+    write_realisations(&mut outputs, frames.len(), || {
+        Ok(make()?.map(|bundle| bundle.map(|bundle| vec![vec![bundle]])))
+    })?;
+    let output = outputs.pop().ok_or_else(|| anyhow::anyhow!("no output"))?;
+    Ok(output.writer.finish()?)
 }
 
-/// Which landmark each observation shows; several realisations of the noise share it.
+/// As [`write_two_pass`], for several outputs with the same observations, of which `make` gives the frames in
+/// chunks; what remains is to finish their writers.
+pub(super) fn write_realisations<I>(
+    outputs: &mut [Realisation],
+    frame_count: usize,
+    make: impl Fn() -> anyhow::Result<I> + Sync,
+) -> anyhow::Result<()>
+where
+    I: Iterator<Item = anyhow::Result<Chunk>>,
+{
+    let total = frame_count as u64;
+    let observed = loop {
+        let progress = Progress::new("counting", "frames");
+        let (mut observed, mut done) = (Observed::default(), 0);
+        for_each_chunk(&make, |chunk| {
+            let first = chunk.first().map_or(&[][..], Vec::as_slice);
+            first.iter().for_each(|bundle| observed.add(bundle));
+            done += first.len() as u64;
+            outputs.par_iter_mut().zip(chunk).try_for_each(|(output, bundles)| {
+                bundles.into_iter().try_for_each(|bundle| output.tally.add(bundle))
+            })?;
+            progress.update(done, total);
+            Ok(())
+        })?;
+        // Statistics of measurements that did not come are made again, of observations.
+        if outputs.iter().all(|output| output.tally.is_as_expected(&observed)) {
+            break observed;
+        }
+        outputs.iter_mut().for_each(|output| output.tally.begin_again());
+    };
+    outputs.par_iter_mut().try_for_each(|output| output.tally.write(&observed, &mut output.writer))?;
+    drop(observed);
+    let (progress, mut done) = (Progress::new("writing", "frames"), 0);
+    for_each_chunk(&make, |chunk| {
+        done += chunk.first().map_or(0, Vec::len) as u64;
+        outputs.par_iter_mut().zip(chunk).try_for_each(|(output, bundles)| {
+            bundles.iter().try_for_each(|bundle| {
+                output.writer.append_frame(bundle.frame.frame_id, FrameRows::from(bundle))
+            })
+        })?;
+        progress.update(done, total);
+        Ok(())
+    })
+}
+
+/// Takes the chunks that `make` makes, while a thread makes the next ones.
+fn for_each_chunk<I>(
+    make: &(impl Fn() -> anyhow::Result<I> + Sync),
+    mut take: impl FnMut(Chunk) -> anyhow::Result<()>,
+) -> anyhow::Result<()>
+where
+    I: Iterator<Item = anyhow::Result<Chunk>>,
+{
+    let (sender, receiver) = sync_channel(WAITING);
+    thread::scope(|scope| {
+        scope.spawn(move || match make() {
+            Ok(chunks) => {
+                for chunk in chunks {
+                    let failed = chunk.is_err();
+                    // Nobody takes any more: whoever did has failed.
+                    if sender.send(chunk).is_err() || failed {
+                        break;
+                    }
+                }
+            }
+            Err(error) => drop(sender.send(Err(error))),
+        });
+        // The receiver is dropped with this closure, which frees the thread where taking fails.
+        let receiver = receiver;
+        receiver.iter().try_for_each(|chunk| take(chunk?))
+    })
+}
+
+/// One of several outputs with the same observations.
+pub(super) struct Realisation {
+    /// Where it is written; the tables of the whole sequence, those made here apart, are there already.
+    pub(super) writer: SequenceWriter,
+    /// What the first pass learns.
+    pub(super) tally: Tally,
+}
+
+impl Realisation {
+    /// An output; measurements are expected where the manifest declares their noise.
+    pub(super) fn new(writer: SequenceWriter, manifest: &Manifest, groups: &[StructuralGroup]) -> Self {
+        Self { writer, tally: Tally::new(groups, &manifest.cameras, [manifest.noise.is_some(); 2]) }
+    }
+}
+
+/// Which landmark each observation shows.
 #[derive(Debug, Default)]
-pub(super) struct Observed {
+struct Observed {
     points: LandmarkRows<PointId>,
     lines: LandmarkRows<LineId>,
 }
 
 impl Observed {
     /// Adds the observations of the next frame.
-    pub(super) fn add(&mut self, bundle: &FrameBundle) {
+    fn add(&mut self, bundle: &FrameBundle) {
         let frame_id = bundle.frame.frame_id;
         self.points.push_frame(frame_id, bundle.point_observations.iter().map(|row| row.point_id));
         self.lines.push_frame(frame_id, bundle.line_observations.iter().map(|row| row.line_id));
     }
 }
 
-/// What the first pass learns of one realisation: which observations were measured, and statistics.
+/// What the first pass learns of one output: which observations were measured, and statistics.
 #[derive(Debug)]
 pub(super) struct Tally {
-    counter: FrameCounter,
+    groups: Vec<StructuralGroup>,
+    cameras: Vec<Camera>,
     expected: [bool; 2],
+    counter: FrameCounter,
     previous: Option<FrameBundle>,
     statistics: Vec<FrameStatistics>,
     points: KeptRows,
     lines: KeptRows,
+    lost_depths: u64,
 }
 
 impl Tally {
     /// * `expected` — whether measurements are expected: of points, of lines.
-    pub(super) fn new(groups: &[StructuralGroup], cameras: &[Camera], expected: [bool; 2]) -> Self {
+    fn new(groups: &[StructuralGroup], cameras: &[Camera], expected: [bool; 2]) -> Self {
         Self {
-            counter: FrameCounter::new(groups, cameras, expected[0], expected[1]),
+            groups: groups.to_vec(),
+            cameras: cameras.to_vec(),
             expected,
+            counter: FrameCounter::new(groups, cameras, expected[0], expected[1]),
             previous: None,
             statistics: Vec::new(),
             points: KeptRows::default(),
             lines: KeptRows::default(),
+            lost_depths: 0,
         }
     }
 
+    /// Measurements: of points, of lines.
+    pub(super) const fn measurements(&self) -> [u64; 2] {
+        [self.points.kept(), self.lines.kept()]
+    }
+
+    /// Depths of measured observations that have no measurement.
+    pub(super) const fn lost_depths(&self) -> u64 {
+        self.lost_depths
+    }
+
     /// Adds the next frame.
-    pub(super) fn add(&mut self, bundle: FrameBundle) -> anyhow::Result<()> {
+    fn add(&mut self, bundle: FrameBundle) -> anyhow::Result<()> {
         let frame_id = bundle.frame.frame_id;
         let unobserved =
             |landmark: String| anyhow::anyhow!("{frame_id}: {landmark} is measured without being observed");
-        keep(
+        self.lost_depths += keep(
             &mut self.points,
-            bundle.point_observations.iter().map(|row| row.point_id),
-            bundle.point_measurements.iter().map(|row| row.point_id),
+            bundle.point_observations.iter().map(|row| (row.point_id, depths([row.depth]))),
+            bundle.point_measurements.iter().map(|row| (row.point_id, depths([row.depth]))),
         )
         .map_err(|id| unobserved(id.to_string()))?;
-        keep(
+        self.lost_depths += keep(
             &mut self.lines,
-            bundle.line_observations.iter().map(|row| row.line_id),
-            bundle.line_measurements.iter().map(|row| row.line_id),
+            bundle
+                .line_observations
+                .iter()
+                .map(|row| (row.line_id, depths([row.start_depth, row.end_depth]))),
+            bundle
+                .line_measurements
+                .iter()
+                .map(|row| (row.line_id, depths([row.start_depth, row.end_depth]))),
         )
         .map_err(|id| unobserved(id.to_string()))?;
         self.statistics.push(self.counter.count(self.previous.as_ref(), &bundle));
@@ -131,15 +232,20 @@ impl Tally {
         Ok(())
     }
 
-    /// What should have been expected, where it was something else: statistics then have to be made again.
-    pub(super) fn unexpected(&self, observed: &Observed) -> Option<[bool; 2]> {
-        let found = [self.points.kept() > 0, self.lines.kept() > 0];
+    /// Whether measurements came where they were expected; else statistics have to be made again.
+    fn is_as_expected(&self, observed: &Observed) -> bool {
         let seen = [!observed.points.is_empty(), !observed.lines.is_empty()];
-        (0..2).any(|kind| seen[kind] && found[kind] != self.expected[kind]).then_some(found)
+        (0..2).all(|kind| !seen[kind] || (self.measurements()[kind] > 0) == self.expected[kind])
+    }
+
+    /// Forgets everything but which measurements came: they are expected now.
+    fn begin_again(&mut self) {
+        let expected = self.measurements().map(|count| count > 0);
+        *self = Self::new(&self.groups, &self.cameras, expected);
     }
 
     /// Writes correspondences and statistics.
-    pub(super) fn write(&self, observed: &Observed, writer: &mut SequenceWriter) -> anyhow::Result<()> {
+    fn write(&self, observed: &Observed, writer: &mut SequenceWriter) -> anyhow::Result<()> {
         let (measured, seen) = (PointMeasurement::TABLE.name, PointObservation::TABLE.name);
         for piece in observed.points.pieces_of(&self.points, PIECE_ROWS) {
             writer.append(&correspondences(piece, |rows| PointCorrespondence::new(measured, rows)))?;
@@ -162,15 +268,107 @@ fn correspondences<T, R>(piece: Vec<T>, row: impl Fn(T) -> R) -> Vec<R> {
     piece.into_iter().map(row).collect()
 }
 
-/// Marks the observed rows that were measured; the error is a landmark that was not observed.
+/// How many depths are there.
+fn depths<const N: usize>(depths: [Option<f64>; N]) -> u64 {
+    depths.iter().flatten().count() as u64
+}
+
+/// Marks the observed rows that were measured, and counts depths that the measured ones lost; the error is a
+/// landmark that was not observed.
 fn keep<Id: PartialEq>(
     kept: &mut KeptRows,
-    observed: impl Iterator<Item = Id>,
-    measured: impl Iterator<Item = Id>,
-) -> Result<(), Id> {
+    observed: impl Iterator<Item = (Id, u64)>,
+    measured: impl Iterator<Item = (Id, u64)>,
+) -> Result<u64, Id> {
     let mut measured = measured.peekable();
-    for id in observed {
-        kept.push(measured.next_if(|next| *next == id).is_some());
+    let mut lost = 0;
+    for (id, depths) in observed {
+        let found = measured.next_if(|(next, _)| *next == id);
+        kept.push(found.is_some());
+        lost += found.map_or(0, |(_, left)| depths.saturating_sub(left));
     }
-    measured.next().map_or(Ok(()), Err)
+    measured.next().map_or(Ok(lost), |(id, _)| Err(id))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::format;
+    use crate::structure::{
+        CameraId, FrameId, Noise, Sequence, frame_statistics, line_correspondences, point_correspondences,
+    };
+
+    /// Frames that see points, of which every third is not measured.
+    fn sequence(measured: bool) -> Sequence {
+        let mut sequence = Sequence::default();
+        for id in 0..7 {
+            let frame_id = FrameId(id);
+            sequence.frames.push(Frame::new(frame_id, id, CameraId(0), None));
+            for point in 0..5 {
+                let (point_id, u, v) = (PointId(point), 3.0 * point as f64, id as f64);
+                sequence.point_observations.push(PointObservation {
+                    frame_id,
+                    point_id,
+                    u,
+                    v,
+                    depth: Some(1.0),
+                });
+                if measured && (point + id) % 3 != 0 {
+                    let row = PointMeasurement { frame_id, point_id, u: u + 40.0, v, depth: None };
+                    sequence.point_measurements.push(row);
+                }
+            }
+        }
+        sequence.point_correspondences =
+            point_correspondences(&sequence.point_measurements, &sequence.point_observations);
+        sequence.line_correspondences = line_correspondences(&[], &[]);
+        sequence.frame_statistics = frame_statistics(&sequence);
+        sequence
+    }
+
+    fn write(sequence: &Sequence, output: &Path) -> anyhow::Result<Written> {
+        let bundles = || Ok(sequence.bundles().map(Ok));
+        let (manifest, frames) = (&sequence.manifest, &sequence.frames);
+        write_two_pass(output, manifest, frames, WriteOptions::default(), &[], |_| Ok(()), bundles)
+    }
+
+    #[test]
+    fn what_follows_from_the_frames_is_as_from_the_whole_sequence_whatever_was_expected() {
+        let folder = tempfile::tempdir().unwrap();
+        for (index, (measured, declared)) in
+            [(true, true), (true, false), (false, true), (false, false)].into_iter().enumerate()
+        {
+            let mut sequence = sequence(measured);
+            let noise = Noise { model: "gaussian".to_owned(), seed: None, parameters: [].into() };
+            sequence.manifest.noise = declared.then_some(noise);
+            let output = folder.path().join(index.to_string());
+            write(&sequence, &output).unwrap();
+            let mut found = format::read(&output).unwrap();
+            found.manifest.tables.clear();
+            assert_eq!(found, sequence, "{measured} {declared}");
+        }
+    }
+
+    #[test]
+    fn what_is_measured_without_being_observed_is_refused_and_nothing_is_left() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut sequence = sequence(true);
+        sequence.point_observations.retain(|row| (row.frame_id, row.point_id) != (FrameId(3), PointId(4)));
+        let error = write(&sequence, &folder.path().join("out")).unwrap_err().to_string();
+        assert_eq!(error, "frame 3: point 4 is measured without being observed");
+        assert_eq!(folder.path().read_dir().unwrap().count(), 0);
+    }
+
+    #[test]
+    fn a_maker_that_fails_is_heard() {
+        let folder = tempfile::tempdir().unwrap();
+        let sequence = sequence(true);
+        let failing = || Ok(sequence.bundles().take(3).map(Ok).chain([Err(anyhow::anyhow!("no more"))]));
+        let output = folder.path().join("out");
+        let (manifest, frames) = (&sequence.manifest, &sequence.frames);
+        let result =
+            write_two_pass(&output, manifest, frames, WriteOptions::default(), &[], |_| Ok(()), failing);
+        assert_eq!(result.unwrap_err().to_string(), "no more");
+        assert_eq!(folder.path().read_dir().unwrap().count(), 0);
+    }
 }

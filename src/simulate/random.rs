@@ -18,7 +18,7 @@ pub struct Random {
 impl Random {
     /// The stream of a seed for a purpose, such as `landmarks`, and an index, such as a frame's id.
     ///
-    /// ChaCha8 with the key SHA-256(`open-structure`, 0, purpose, 0, seed in little-endian order) and the
+    /// `ChaCha8` with the key SHA-256(`open-structure`, 0, purpose, 0, seed in little-endian order) and the
     /// index as its stream number.
     #[must_use]
     pub fn new(seed: u64, purpose: &str, index: u64) -> Self {

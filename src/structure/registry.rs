@@ -161,7 +161,7 @@ pub const FAMILIES: &[Family] = &[
             ),
             (
                 NOISE_KINECT_DISPARITY,
-                "pixels as `gaussian`; `d = m / (⌊m/d̂ + α_δ + 0.5⌋)` with disparity noise `α_δ ~ N(0, sigma_disparity²)` and d in centimetres; parameters `sigma_px`, `m`, `sigma_disparity`",
+                "pixels as `gaussian`; `d = m / ⌊m/d̃ + α_δ + 0.5⌋` with disparity noise `α_δ ~ N(0, sigma_disparity²)` and d in centimetres; `d̃` is the depth a lateral shift away, section 4.3; parameters `sigma_px`, `m`, `sigma_disparity`, `sigma_lateral_px`",
             ),
         ],
     },

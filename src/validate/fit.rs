@@ -25,6 +25,8 @@ pub(crate) struct Fit<const N: usize> {
     pub(crate) rows: u32,
     /// Rows in which the landmark has no image: it lies behind the camera.
     pub(crate) behind: u32,
+    /// Rows that are taken for declared outliers, and not summed.
+    pub(crate) wild: u32,
     squares: f64,
     gradient: SVector<f64, N>,
     /// Upper triangle alone.
@@ -33,7 +35,14 @@ pub(crate) struct Fit<const N: usize> {
 
 impl<const N: usize> Default for Fit<N> {
     fn default() -> Self {
-        Self { rows: 0, behind: 0, squares: 0.0, gradient: SVector::zeros(), hessian: SMatrix::zeros() }
+        Self {
+            rows: 0,
+            behind: 0,
+            wild: 0,
+            squares: 0.0,
+            gradient: SVector::zeros(),
+            hessian: SMatrix::zeros(),
+        }
     }
 }
 
@@ -57,6 +66,12 @@ impl<const N: usize> Fit<N> {
     #[inline]
     pub(crate) fn add_behind(&mut self) {
         self.behind += 1;
+    }
+
+    /// Adds a row that is taken for a declared outlier.
+    #[inline]
+    pub(crate) fn add_wild(&mut self) {
+        self.wild += 1;
     }
 
     /// What the sums say; `None` when there are too few rows or numbers that are not finite.

@@ -199,13 +199,19 @@ pub(crate) fn lines<R: LineRow>(
                 continue;
             }
             let residuals = [start.0, end.0];
+            if R::MEASURED && world.noise.is_outlier(residuals) {
+                fits[landmark].add_wild();
+                continue;
+            }
             // A segment without length says nothing of a line's direction, nor of its place along.
             if !coincide(ends) {
                 fits[landmark].add(residuals, &[start.1, end.1]);
             }
             let landmark = u32::try_from(landmark).unwrap_or(u32::MAX);
             if R::MEASURED {
-                let depths = ends.map(|end| depth_residual(&image, end, world));
+                let takes = sample.takes_next();
+                let depths =
+                    ends.map(|end| if takes { depth_residual(&image, end, world) } else { f64::NAN });
                 sample.add(Residual { landmark, pixels: residuals, depths });
             } else {
                 let worst = residuals[0].abs().max(residuals[1].abs());
@@ -256,9 +262,9 @@ fn segment(
 /// The depth residual of an end; NaN where there is none, or where the pixel's noise would drown it.
 fn depth_residual(image: &LineImage<'_>, end: End, world: &World<'_>) -> f64 {
     let (Some(noise), Some(measured)) = (world.noise.depth, end.depth) else { return f64::NAN };
-    let sigma_px = world.noise.sigma_px.unwrap_or(1.0);
+    let sigma_px = world.noise.sigma_along_px();
     match image.depth(end.pixel) {
-        Some((z, by_pixel)) if by_pixel * sigma_px <= DEPTH_SENSITIVITY * noise.sigma_m() => {
+        Some((z, by_pixel)) if by_pixel * sigma_px <= DEPTH_SENSITIVITY * noise.sigma_m(z) => {
             noise.residual(measured, z)
         }
         _ => f64::NAN,

@@ -17,6 +17,7 @@
 
 mod container;
 mod correspondences;
+mod depth_noise;
 mod estimates;
 mod finding;
 mod fit;

@@ -133,9 +133,13 @@ pub(crate) fn points<R: PointRow>(
             if !(residuals[0].is_finite() && residuals[1].is_finite()) {
                 continue;
             }
+            if R::MEASURED && world.noise.is_outlier(residuals) {
+                fits[landmark].add_wild();
+                continue;
+            }
             fits[landmark].add(residuals, &projection.derivatives);
             if R::MEASURED {
-                let noise = world.noise.depth.zip(depth);
+                let noise = world.noise.depth.zip(depth).filter(|_| sample.takes_next());
                 let depth = noise.map_or(f64::NAN, |(noise, depth)| noise.residual(depth, projection.z));
                 let pixels = residuals;
                 sample.add(Residual { landmark: name, pixels, depths: [depth, f64::NAN] });

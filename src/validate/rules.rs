@@ -183,7 +183,7 @@ rules! {
         "Two estimates with identical poses are probably one.",
         None, "1.0.0";
     PixelInImage: "pixel-in-image", Warning, "6.19",
-        "Pixel positions SHOULD lie within the image, widened by 1 px for observations and by 6 sigma for measurements; sigma is that of the declared noise, else 1 px.",
+        "Pixel positions SHOULD lie within the image, widened by 1 px for observations and by 6 sigma and half a rounding step for measurements; sigma is that of the declared noise, else 1 px.",
         Some("Noise carries measurements over the edge; sigma is the declared one, else 1 px."), "1.0.0";
     DepthPositive: "depth-positive", Error, "4.4",
         "Depths MUST be greater than 0.",

@@ -2,7 +2,7 @@
 
 use super::finding::{Detail, Findings};
 use super::fit::{Evaluation, Fit, LEAST_ROWS, MOST_EXCESS, SIGMA_FLOOR_PX, common_sigma};
-use super::noise::{Declared, Found, judge_depth, judge_pixels, robust_sigma};
+use super::noise::{Declared, Found, judge_depth, judge_outliers, judge_pixels, robust_sigma};
 use super::point_rows::Seen;
 use super::rules::RuleId;
 
@@ -46,11 +46,14 @@ pub(crate) fn judge<const N: usize>(
 
     let mut wrong = vec![false; ids.len()];
     for (place, id) in ids.iter().enumerate() {
+        let judged = [true, !declared.roundings_agree()];
         let found = [
             (&observed.fits, &observations, sigma_of_observations, kind.observations),
             (&measured.fits, &measurements, sigma_of_measurements, kind.measurements),
         ]
         .into_iter()
+        .zip(judged)
+        .filter_map(|(table, judged)| judged.then_some(table))
         .find_map(|(fits, evaluations, sigma, table)| {
             accusation(kind, fits.get(place)?, evaluations[place].as_ref(), sigma, table)
         });
@@ -149,7 +152,9 @@ fn noise<const N: usize>(
     let sigma = common.unwrap_or(0.0).max(CLEAN_SIGMA_PX);
     measured.sample.keep(|place| {
         !wrong[place]
-            && evaluations[place].as_ref().is_some_and(|found| found.excess <= CLEAN_EXCESS * sigma * sigma)
+            && evaluations[place].as_ref().is_some_and(|found| {
+                declared.roundings_agree() || found.excess <= CLEAN_EXCESS * sigma * sigma
+            })
     });
     let sample = &measured.sample;
     // The distances of a segment's two ends are of one kind; u and v of a point may differ.
@@ -174,4 +179,9 @@ fn noise<const N: usize>(
     judge_pixels(&found, declared, kind.measurements, findings);
     let depths = [0, 1].into_iter().flat_map(|index| sample.column(|row| row.depths[index])).collect();
     judge_depth(depths, declared, kind.measurements, findings);
+    let right = measured.fits.iter().zip(wrong).filter(|(_, wrong)| !**wrong);
+    let (wild, rows) = right.fold((0, 0), |(wild, rows), (fit, _)| {
+        (wild + u64::from(fit.wild), rows + u64::from(fit.wild) + u64::from(fit.rows))
+    });
+    judge_outliers(wild, rows, declared, kind.measurements, findings);
 }

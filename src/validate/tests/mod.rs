@@ -2,6 +2,7 @@
 
 mod good;
 mod memory;
+mod noise_models;
 mod statistics;
 mod stored;
 

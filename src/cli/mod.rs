@@ -1,14 +1,17 @@
 //! The command line: arguments in, calls to the rooms below, rendering out.
 
 mod cat;
+mod chart;
 mod completions;
 mod convert;
 mod copy;
 mod explain;
 mod info;
 mod man;
+mod plot;
 mod progress;
 mod schema;
+mod stats;
 mod text;
 mod validate;
 
@@ -41,6 +44,8 @@ enum Command {
     Info(info::Args),
     Cat(cat::Args),
     Copy(copy::Args),
+    Stats(stats::Args),
+    Plot(plot::Args),
     Schema(schema::Args),
     Convert(convert::Args),
     Completions(completions::Args),
@@ -74,6 +79,8 @@ pub fn main() -> ExitCode {
         Command::Info(args) => info::run(args, &mut stdout),
         Command::Cat(args) => cat::run(args, &mut stdout),
         Command::Copy(args) => copy::run(args, &mut stdout),
+        Command::Plot(args) => plot::run(args, &mut stdout),
+        Command::Stats(args) => stats::run(args, &mut stdout),
         Command::Schema(args) => schema::run(args, &mut stdout),
         Command::Convert(args) => convert::run(args),
         Command::Completions(args) => completions::run(args, &mut stdout),

@@ -165,14 +165,15 @@ impl Analysis {
             };
         }
         for (ends, truth) in shared(lines!(frame.line_measurements), lines!(frame.line_observations)) {
-            let [start, end] = truth;
+            let [start, other_end] = truth;
             let apart =
                 |truth: [End; 2]| ends.iter().zip(truth).map(|(end, truth)| square(*end, truth)).sum::<f64>();
-            let truth = if apart([end, start]) < apart(truth) { [end, start] } else { truth };
-            for ((pixel, depth), (true_pixel, true_depth)) in ends.into_iter().zip(truth) {
-                line_px.add(pixel[0] - true_pixel[0]);
-                line_px.add(pixel[1] - true_pixel[1]);
-                if let Some((depth, true_depth)) = depth.zip(true_depth) {
+            let truth = if apart([other_end, start]) < apart(truth) { [other_end, start] } else { truth };
+            for (end, truth_end) in ends.into_iter().zip(truth) {
+                line_px.add(distance_from_line(end.0, [start.0, other_end.0]));
+                let depths =
+                    end.1.zip(truth_end.1).filter(|_| square(end, truth_end) <= SAME_END_PX * SAME_END_PX);
+                if let Some((depth, true_depth)) = depths {
                     line_depth.add(depth - true_depth);
                 }
             }
@@ -225,8 +226,18 @@ impl Analysis {
     }
 }
 
+/// Ends of a measured and an observed segment are of the same place up to this distance, pixels: a segment may be seen in another part.
+const SAME_END_PX: f64 = 5.0;
+
 /// Pixel and depth of an end.
 type End = ([f64; 2], Option<f64>);
+
+/// Signed distance of a pixel from the endless line through two others, pixels; not finite where these are one.
+fn distance_from_line([u, v]: [f64; 2], [start, end]: [[f64; 2]; 2]) -> f64 {
+    let (along_u, along_v) = (end[0] - start[0], end[1] - start[1]);
+    let length = (along_u * along_u + along_v * along_v).sqrt();
+    (along_u * (v - start[1]) - along_v * (u - start[0])) / length
+}
 
 /// Squared distance of two ends, square pixels.
 fn square((one, _): End, (other, _): End) -> f64 {

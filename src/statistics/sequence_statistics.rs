@@ -94,7 +94,7 @@ pub struct MotionStatistics {
     pub turn_rate_rad_per_s: Option<Distribution>,
 }
 
-/// Measurement less observation. Ends of segments are matched in the order in which they are nearer.
+/// Measurement less observation. A segment may be measured in another part than it is observed in, so its ends count across it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
 #[schemars(inline)]
 pub struct NoiseStatistics {
@@ -104,10 +104,10 @@ pub struct NoiseStatistics {
     /// Depths of points, metres.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub point_depth_m: Option<Difference>,
-    /// Columns and rows of the ends of segments, pixels.
+    /// Distances of the ends of measured segments from the lines of the observed ones, pixels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub line_px: Option<Difference>,
-    /// Depths of the ends of segments, metres.
+    /// Depths of ends that are measured within 5 pixels of the observed ones, metres.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub line_depth_m: Option<Difference>,
 }

@@ -72,7 +72,7 @@ pub fn scene_picture(scene: &Scene<'_>, view: ViewFrom) -> Result<String, Error>
     let colours = lines(&mut svg, scene, &shapes, &fit);
     let path: Vec<[f64; 2]> = shapes.path.iter().filter_map(|place| fit.place(*place)).collect();
     svg.strokes(std::iter::once(path.as_slice()), 2.0, INK, 0.9);
-    cameras(&mut svg, scene, &plane, &fit);
+    cameras(&mut svg, scene, &shapes, &plane, &fit);
     ends(&mut svg, &path);
     svg.element("</g>");
     words(&mut svg, scene, &colours);
@@ -173,10 +173,18 @@ fn lines(
 }
 
 /// Draws some cameras along the path, as the pyramids of what they see.
-fn cameras(svg: &mut Svg, scene: &Scene<'_>, plane: &Plane, fit: &Fit) {
+fn cameras(svg: &mut Svg, scene: &Scene<'_>, shapes: &Shapes, plane: &Plane, fit: &Fit) {
     let posed: Vec<&Frame> =
         scene.frames.iter().filter(|frame| frame.world_from_camera().is_some()).collect();
-    let depth = 46.0 / fit.scale;
+    // Smaller where the path is short in the picture, so that its cameras do not hide each other.
+    let spread = |axis: usize| {
+        let places = || shapes.path.iter().map(|place| place[axis]);
+        let (low, high) =
+            places().fold((f64::MAX, f64::MIN), |(low, high), place| (low.min(place), high.max(place)));
+        (high - low).max(0.0)
+    };
+    let size = (0.11 * (spread(0) + spread(1)) * fit.scale).clamp(16.0, 46.0);
+    let depth = size / fit.scale;
     let mut strokes: Vec<Vec<[f64; 2]>> = Vec::new();
     for frame in thinned(&posed, CAMERAS) {
         let Some(Ok(pose)) = frame.world_from_camera().map(|pose| pose.pose()) else { continue };
@@ -271,4 +279,76 @@ fn scale(svg: &mut Svg, fit: &Fit) {
     );
     let words = if (1e-3..1e5).contains(&round) { format!("{round} m") } else { format!("{round:e} m") };
     svg.words([0.5 * (left + right), y - 10.0], 15.0, "middle", INK, &words);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::structure::{FrameId, PointId, PoseRow};
+    use proptest::prelude::*;
+
+    fn point(id: i64, place: [f64; 3]) -> PointLandmark {
+        PointLandmark::new(PointId(id), place.into())
+    }
+
+    fn frame(id: i64, translation: [f64; 3]) -> Frame {
+        let pose = PoseRow { translation, rotation_xyzw: [0.0, 0.0, 0.0, 1.0] };
+        Frame::new(FrameId(id), 0, crate::structure::CameraId(0), Some(pose))
+    }
+
+    fn picture(points: &[PointLandmark], frames: &[Frame]) -> Result<String, Error> {
+        let manifest = Manifest { name: "<name>".to_owned(), ..Manifest::default() };
+        let scene = Scene { manifest: &manifest, frames, points, lines: &[], groups: &[] };
+        scene_picture(&scene, ViewFrom::OBLIQUE)
+    }
+
+    #[test]
+    fn of_nothing_there_is_no_picture() {
+        assert_eq!(picture(&[], &[]), Err(Error::Nothing { name: "<name>".to_owned() }));
+        assert!(picture(&[point(0, [f64::NAN, 0.0, 0.0])], &[]).is_err());
+        assert!(picture(&[point(0, [1.0, 2.0, 3.0])], &[]).is_ok());
+        assert!(picture(&[], &[frame(0, [1.0, 2.0, 3.0])]).is_ok());
+    }
+
+    #[test]
+    fn many_points_and_frames_make_a_picture_of_bounded_size() {
+        let points: Vec<_> =
+            (0..100_000_i32).map(|id| point(i64::from(id), [f64::from(id), 0.0, 1.0])).collect();
+        let frames: Vec<_> =
+            (0..50_000_i32).map(|id| frame(i64::from(id), [0.0, f64::from(id), 1.0])).collect();
+        let size = picture(&points, &frames).unwrap().len();
+        assert!(size < 500_000, "{size} bytes");
+    }
+
+    #[test]
+    fn a_stray_point_does_not_shrink_the_scene() {
+        let mut points: Vec<_> = (0..1000_i32)
+            .map(|id| point(i64::from(id), [f64::from(id % 10), f64::from(id / 100), 0.0]))
+            .collect();
+        let plane = Plane::new(ViewFrom::TOP, Vector3::z()).unwrap();
+        let manifest = Manifest::default();
+        let fit = |points: &[PointLandmark]| {
+            let scene = Scene { manifest: &manifest, frames: &[], points, lines: &[], groups: &[] };
+            Fit::new(&shapes(&scene, &plane)).unwrap()
+        };
+        let before = fit(&points).scale;
+        points.push(point(5000, [1e6, 1e6, 0.0]));
+        let after = fit(&points);
+        assert_eq!(after.scale, before);
+        assert_eq!(after.place([1e6, 1e6]), None);
+    }
+
+    proptest! {
+        #[test]
+        fn numbers_of_any_size_make_a_picture_or_an_error(
+            places in prop::collection::vec(prop::array::uniform3(any::<f64>()), 1..6),
+        ) {
+            let points: Vec<_> = places.iter().map(|place| point(0, *place)).collect();
+            let frames: Vec<_> = places.iter().map(|place| frame(0, *place)).collect();
+            if let Ok(picture) = picture(&points, &frames) {
+                prop_assert!(!picture.contains("NaN") && !picture.contains("inf"));
+                prop_assert!(picture.contains("&lt;name&gt;") && !picture.contains("<name>"));
+            }
+        }
+    }
 }

@@ -27,6 +27,7 @@ use crate::structure::{FrameStatistics, LineMeasurement, PointMeasurement, Recor
   os stats box1 --json | jq .points.track_length_frames
   os stats out/* --csv > statistics.csv
   os stats box1 --frames --csv > frames.csv")]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of its own")]
 pub(super) struct Args {
     /// Sequences: MCAP files or Parquet folders.
     #[arg(required_unless_present = "schema")]

@@ -19,4 +19,4 @@ const INK: &str = "#1a1a1a";
 const QUIET: &str = "#8c8c8c";
 /// Colours that are told apart with any kind of sight (Okabe and Ito 2008), without black and yellow.
 const COLOURS: [&str; 6] = ["#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
-const FONT: &str = "font-family=\"system-ui, sans-serif\"";
+const FONT: &str = "font-family=\"Helvetica, Arial, DejaVu Sans, sans-serif\"";

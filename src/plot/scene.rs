@@ -14,7 +14,7 @@ const WIDTH: f64 = 1200.0;
 const HEIGHT: f64 = 800.0;
 /// Free on each side, and above for the title.
 const MARGIN: f64 = 40.0;
-const HEAD: f64 = 84.0;
+const HEAD: f64 = 96.0;
 /// Most points, lines and places of the path that are drawn: what is drawn keeps its shape, the file stays small.
 const MOST_POINTS: usize = 20_000;
 const MOST_LINES: usize = 10_000;
@@ -63,8 +63,8 @@ pub fn scene_picture(scene: &Scene<'_>, view: ViewFrom) -> Result<String, Error>
     let mut svg = Svg::new(WIDTH, HEIGHT, PAPER, &format!("Scene and trajectory of {}", manifest.name));
     svg.element(&format!(
         "<clipPath id=\"c\"><rect y=\"{0}\" width=\"{WIDTH}\" height=\"{1}\"/></clipPath><g clip-path=\"url(#c)\">",
-        HEAD - 24.0,
-        HEIGHT - HEAD + 24.0
+        HEAD,
+        HEIGHT - HEAD
     ));
     // Fewer points may be larger.
     let diameter = (9.0 - 1.4 * libm::log10(shapes.dots.len().max(1) as f64)).clamp(2.5, 6.0);
@@ -226,22 +226,23 @@ fn words(svg: &mut Svg, scene: &Scene<'_>, colours: &[(GroupId, &'static str, us
         scene.lines.len(),
         posed
     );
-    svg.words([MARGIN, 60.0], 16.0, "start", INK, &counts);
+    svg.words([MARGIN, 59.0], 16.0, "start", INK, &counts);
     if scene.lines.is_empty() {
         return;
     }
-    // The legend, from the right.
-    let mut right = WIDTH - MARGIN;
     let shown = colours.iter().take(COLOURS.len());
-    let others = [(None, QUIET, String::from("in no group"))];
-    let named =
-        shown.map(|(group, colour, size)| (Some(group), *colour, format!("group {}: {size}", group.0)));
-    let entries: Vec<_> = named.chain(others).collect();
-    for (_, colour, words) in entries.iter().rev() {
-        svg.words([right, 60.0], 15.0, "end", INK, words);
-        right -= 7.8 * words.chars().count() as f64 + 8.0;
-        svg.strokes(std::iter::once(&[[right - 20.0, 55.0], [right, 55.0]][..]), 4.0, colour, 1.0);
-        right -= 38.0;
+    let mut entries: Vec<(&str, String)> =
+        shown.map(|(group, colour, size)| (*colour, format!("group {}: {size}", group.0))).collect();
+    entries.push((QUIET, "in no group".to_owned()));
+    if colours.len() > COLOURS.len() {
+        entries
+            .push((PAPER, format!("and {} groups more, in the same colours", colours.len() - COLOURS.len())));
+    }
+    let mut left = MARGIN;
+    for (colour, words) in &entries {
+        svg.strokes(std::iter::once(&[[left + 2.0, 79.0], [left + 20.0, 79.0]][..]), 4.0, colour, 1.0);
+        svg.words([left + 28.0, 84.0], 15.0, "start", INK, words);
+        left += 28.0 + 8.0 * words.chars().count() as f64 + 18.0;
     }
 }
 

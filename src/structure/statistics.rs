@@ -213,7 +213,7 @@ pub(crate) fn median(numbers: &mut Vec<f64>) -> Option<f64> {
     numbers.sort_by(f64::total_cmp);
     let middle = numbers.len() / 2;
     let high = numbers.get(middle)?;
-    Some(if numbers.len() % 2 == 0 { 0.5 * (numbers[middle - 1] + high) } else { *high })
+    Some(if numbers.len().is_multiple_of(2) { 0.5 * (numbers[middle - 1] + high) } else { *high })
 }
 
 /// Statistics of every frame of a sequence, in table order; see [`FrameCounter`].

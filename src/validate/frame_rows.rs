@@ -44,6 +44,9 @@ pub(crate) struct FrameRows<'a> {
     counts: Option<Counts<'a>>,
 }
 
+/// Where a frame shows a point; `None` for a line.
+type Pixel = Option<[f64; 2]>;
+
 struct Counts<'a> {
     world: &'a World<'a>,
     frames: Vec<FrameCount>,
@@ -53,9 +56,9 @@ struct Counts<'a> {
     segments: Vec<[[f64; 2]; 2]>,
     grouped: Vec<i64>,
     /// Landmarks of the current frame with their pixels, where they are points.
-    landmarks: Vec<(i64, Option<[f64; 2]>)>,
+    landmarks: Vec<(i64, Pixel)>,
     /// Those of a frame before it.
-    before: (usize, Vec<(i64, Option<[f64; 2]>)>),
+    before: (usize, Vec<(i64, Pixel)>),
 }
 
 /// What the books say in the end.
@@ -211,7 +214,7 @@ impl Counts<'_> {
     }
 
     /// Median angle between the rays to the points of the current frame and one before it.
-    fn parallax(&self, before: usize, both: &[(Option<[f64; 2]>, Option<[f64; 2]>)]) -> Option<f64> {
+    fn parallax(&self, before: usize, both: &[(Pixel, Pixel)]) -> Option<f64> {
         let sight = |place: usize| {
             let entry = self.world.frames.entry(place);
             Some((self.world.views[entry.camera?].as_ref()?.pinhole, entry.pose?.rotation))

@@ -4,6 +4,7 @@
 pub mod cli;
 pub mod format;
 pub mod geometry;
+pub mod plot;
 pub mod simulate;
 pub mod statistics;
 pub mod structure;

@@ -17,6 +17,7 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("track", &["geometry", "structure"]),
     ("adjust", &["geometry", "structure"]),
     ("statistics", &["geometry", "structure"]),
+    ("plot", &["geometry", "structure"]),
     ("evaluate", &["geometry", "structure"]),
     ("validate", &["geometry", "structure", "format", "simulate", "track", "adjust", "evaluate"]),
     (
@@ -27,6 +28,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "format",
             "simulate",
             "statistics",
+            "plot",
             "track",
             "adjust",
             "evaluate",

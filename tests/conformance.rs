@@ -58,7 +58,9 @@ fn filled(tables: &[TableSummary]) -> Vec<TableSummary> {
 }
 
 /// A sequence written in the other encoding and read again is the same, bit by bit.
-fn copy_is_equal(sequence: &Sequence, stored: Stored) -> Result<(), String> {
+///
+/// * `unread` — tables with columns that are not known: their digests cover what a copy does not have.
+fn copy_is_equal(sequence: &Sequence, unread: &[&str], stored: Stored) -> Result<(), String> {
     let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
     let copy = folder.path().join(match stored {
         Stored::Mcap => Stored::Parquet.file_name(),
@@ -66,7 +68,11 @@ fn copy_is_equal(sequence: &Sequence, stored: Stored) -> Result<(), String> {
     });
     let failed = |error: format::Error| format!("copy: {error}");
     let written = format::write(&copy, sequence, WriteOptions::default()).map_err(failed)?;
-    if written.tables != filled(&sequence.manifest.tables) {
+    let known = |mut tables: Vec<TableSummary>| {
+        tables.retain(|summary| !unread.contains(&summary.table.as_str()));
+        tables
+    };
+    if known(written.tables) != known(filled(&sequence.manifest.tables)) {
         return Err("counts or digests of the copy differ".to_owned());
     }
     let mut back = format::read(&copy).map_err(failed)?;
@@ -97,7 +103,9 @@ fn readers_take_valid_cases_and_their_copies_are_equal() {
             let twin = format::read(path.with_file_name(Stored::Mcap.file_name())).map_err(failed)?;
             return if twin == sequence { Ok(()) } else { Err("not what the MCAP file holds".to_owned()) };
         }
-        copy_is_equal(&sequence, stored)
+        let stored_tables = reader.tables();
+        let unread = stored_tables.iter().filter(|stored| !stored.unknown_columns.is_empty());
+        copy_is_equal(&sequence, &unread.map(|stored| stored.table.name).collect::<Vec<_>>(), stored)
     });
 }
 

@@ -1,6 +1,7 @@
 //! The command line: arguments in, calls to the rooms below, rendering out.
 
 mod cat;
+mod chart;
 mod completions;
 mod convert;
 mod copy;
@@ -9,8 +10,11 @@ mod info;
 mod left_behind;
 mod man;
 mod measure;
+mod plot;
 mod progress;
 mod schema;
+mod simulate;
+mod stats;
 mod text;
 mod two_pass;
 mod validate;
@@ -44,7 +48,10 @@ enum Command {
     Info(info::Args),
     Cat(cat::Args),
     Copy(copy::Args),
+    Simulate(simulate::Args),
     Measure(measure::Args),
+    Stats(stats::Args),
+    Plot(plot::Args),
     Schema(schema::Args),
     Convert(convert::Args),
     Completions(completions::Args),
@@ -78,7 +85,10 @@ pub fn main() -> ExitCode {
         Command::Info(args) => info::run(args, &mut stdout),
         Command::Cat(args) => cat::run(args, &mut stdout),
         Command::Copy(args) => copy::run(args, &mut stdout),
+        Command::Simulate(args) => simulate::run(args, &mut stdout),
         Command::Measure(args) => measure::run(args, &mut stdout),
+        Command::Plot(args) => plot::run(args, &mut stdout),
+        Command::Stats(args) => stats::run(args, &mut stdout),
         Command::Schema(args) => schema::run(args, &mut stdout),
         Command::Convert(args) => convert::run(args),
         Command::Completions(args) => completions::run(args, &mut stdout),

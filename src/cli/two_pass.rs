@@ -37,7 +37,6 @@ pub(super) type Chunk = Vec<Vec<FrameBundle>>;
 ///   own. Measured landmarks are among the observed ones, and rows are in key order.
 ///
 /// Nothing is left behind where anything fails.
-#[allow(dead_code, reason = "written for the commands that make one sequence")]
 pub(super) fn write_two_pass<I>(
     output: &Path,
     manifest: &Manifest,

@@ -7,13 +7,14 @@ use serde::{Serialize, Serializer, ser::SerializeMap as _};
 use serde_json::Value;
 
 use super::member_names::{Members, member_names};
+use crate::structure::registry::SPEC_VERSION;
 use crate::structure::{
     Camera, Clock, Conventions, Distortion, Exclusion, Generator, Manifest, Noise, Recovery, Source,
     SourceFile, TableSummary, for_each_table,
 };
 
 /// Where the schemas of this specification version are named.
-const BASE: &str = "https://open-structure.github.io/spec/1.0.0/schemas/";
+const BASE: &str = "https://open-structure.github.io/spec/";
 
 /// The schema of a type, as pretty JSON with a final newline: the very bytes of `spec/schemas`.
 ///
@@ -24,7 +25,8 @@ fn schema_text<T: JsonSchema + for<'de> serde::Deserialize<'de>>(name: &str) -> 
     let settings = SchemaSettings::draft2020_12().with(|settings| settings.inline_subschemas = true);
     let mut schema = settings.into_generator().into_root_schema_for::<T>();
     RecursiveTransform(without_null).transform(&mut schema);
-    schema.insert("$id".to_owned(), Value::String(format!("{BASE}{name}.schema.json")));
+    schema
+        .insert("$id".to_owned(), Value::String(format!("{BASE}{SPEC_VERSION}/schemas/{name}.schema.json")));
     let orders = orders::<T>();
     let ordered = Ordered { value: schema.as_value(), orders: &orders, members: None };
     let mut text = serde_json::to_string_pretty(&ordered).unwrap_or_default();

@@ -46,3 +46,28 @@ pub fn hex(bytes: &[u8]) -> String {
         text
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::structure::{FrameId, FrameStatistics};
+
+    fn digest(rows: &[FrameStatistics]) -> String {
+        let mut digest = ContentDigest::default();
+        digest.update(rows);
+        digest.finish()
+    }
+
+    #[test]
+    fn a_column_of_a_minor_version_leaves_no_trace_where_it_is_absent() {
+        let mut row = FrameStatistics { frame_id: FrameId(7), point_count: 3, ..FrameStatistics::default() };
+        let version_1_0: Vec<u8> =
+            [7_i64, 3, 0, 0, 0].iter().flat_map(|number| number.to_le_bytes()).collect();
+        assert_eq!(digest(std::slice::from_ref(&row)), hex(&Sha256::digest(&version_1_0)));
+
+        row.covered_cells = Some(5);
+        let name = b"\x0d\0\0\0\0\0\0\0covered_cells".iter().copied();
+        let with = version_1_0.into_iter().chain(name).chain([1]).chain(5_i64.to_le_bytes());
+        assert_eq!(digest(&[row]), hex(&Sha256::digest(with.collect::<Vec<_>>())));
+    }
+}

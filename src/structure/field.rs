@@ -49,6 +49,8 @@ pub struct Field {
     /// Space in which the value is expressed: `world`, `camera`, `image`, a transform
     /// such as `world_from_camera`, or `-` where none applies.
     pub space: &'static str,
+    /// First version of the specification with the column; only nullable ones come after 1.0.0.
+    pub since: &'static str,
     /// Lines of the doc comment.
     pub doc: &'static [&'static str],
 }

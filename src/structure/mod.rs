@@ -4,6 +4,7 @@
 //! specification; [`Record`] and [`Field`] carry that description.
 
 mod camera;
+mod cells;
 mod column;
 mod correspondence;
 mod digest;
@@ -32,6 +33,7 @@ mod trajectory;
 mod trajectory_file;
 
 pub use camera::{Camera, Distortion};
+pub use cells::ImageCells;
 pub use column::{Bitmap, ColumnSink, ColumnSource, ColumnValue, Lists, Nullable};
 pub use correspondence::{
     LineCorrespondence, PointCorrespondence, line_correspondences, point_correspondences,
@@ -54,6 +56,7 @@ pub use provenance::{Exclusion, Generator, Recovery, Source, SourceFile};
 pub use record::Record;
 pub use sequence::{FrameBundle, Sequence};
 pub use statistics::{CELL_SIZE_PX, FrameCounter, frame_statistics};
+pub(crate) use statistics::{angle, median, ray, shared};
 pub use structural_group::StructuralGroup;
 pub use table::{TABLES, table_info};
 pub(crate) use table::{for_each_frame_table, for_each_table};

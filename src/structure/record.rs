@@ -51,9 +51,33 @@ pub(crate) fn is_absent<T: ColumnValue>(value: &T) -> bool {
     value.is_absent()
 }
 
+/// First version of the specification with a column.
+pub(crate) const fn since(added: &[&'static str]) -> &'static str {
+    match added {
+        [] => "1.0.0",
+        [version, ..] => version,
+    }
+}
+
+/// Appends the canonical bytes of a value.
+///
+/// A column that a minor version added leaves no trace where it is absent, so that the digest of a file from
+/// before stays what it was; where it is present its name comes first.
+#[inline]
+pub(crate) fn digest<T: ColumnValue>(value: &T, name: &str, added: &[&str], bytes: &mut Vec<u8>) {
+    if !added.is_empty() {
+        if value.is_absent() {
+            return;
+        }
+        bytes.extend_from_slice(&(name.len() as u64).to_le_bytes());
+        bytes.extend_from_slice(name.as_bytes());
+    }
+    value.digest(bytes);
+}
+
 /// Defines a row struct together with its [`TableInfo`] and its [`Record`] implementation.
 ///
-/// `[unit, space]` stands before each column; `frame:` names the column that says the frame of a
+/// `[unit, space]` stands before each column, `[unit, space, since]` before one that a minor version added; `frame:` names the column that says the frame of a
 /// per-frame row.
 macro_rules! record {
     (
@@ -61,7 +85,7 @@ macro_rules! record {
         pub struct $name:ident in $table:ident ($storage:ident, $need:ident, key: [$($key:ident),+] $(, frame: $frame:ident)?) {
             $(
                 $(#[doc = $field_doc:literal])*
-                [$unit:literal, $space:literal]
+                [$unit:literal, $space:literal $(, $since:literal)?]
                 $field:ident: $type:ty,
             )+
         }
@@ -72,7 +96,7 @@ macro_rules! record {
         pub struct $name {
             $(
                 $(#[doc = $field_doc])*
-                #[schemars(extend("x-unit" = $unit, "x-space" = $space))]
+                #[schemars(extend("x-unit" = $unit, "x-space" = $space $(, "x-since" = $since)?))]
                 #[serde(skip_serializing_if = "crate::structure::record::is_absent")]
                 pub $field: $type,
             )+
@@ -91,6 +115,7 @@ macro_rules! record {
                     nullable: <$type as crate::structure::ColumnValue>::NULLABLE,
                     unit: $unit,
                     space: $space,
+                    since: crate::structure::record::since(&[$($since)?]),
                     doc: &[$($field_doc),*],
                 }),+],
                 doc: &[$($doc),*],
@@ -125,7 +150,7 @@ macro_rules! record {
             }
 
             fn digest(&self, bytes: &mut Vec<u8>) {
-                $(crate::structure::ColumnValue::digest(&self.$field, bytes);)+
+                $(crate::structure::record::digest(&self.$field, stringify!($field), &[$($since)?], bytes);)+
             }
 
             fn frame(&self) -> Option<crate::structure::FrameId> {

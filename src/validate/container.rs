@@ -9,6 +9,7 @@ use super::manifest::Known;
 use super::rules::RuleId;
 use super::tables::Outcome;
 use crate::format::{Faults, McapSurvey};
+use crate::structure::registry::SPEC_VERSION;
 use crate::structure::{TABLES, TableSummary, table_info};
 
 /// Topics of JSON messages, and what they hold.
@@ -169,7 +170,8 @@ pub(crate) fn listed(summaries: &[TableSummary], present: &[&'static str], findi
     }
     for summary in summaries.iter().filter(|summary| table_info(&summary.table).is_none()) {
         findings.add(RuleId::UnknownContent, None, || {
-            Detail::new("tables of version 1.0.0", "the summary of another one").id(&summary.table)
+            Detail::new(format!("tables of version {SPEC_VERSION}"), "the summary of another one")
+                .id(&summary.table)
         });
     }
 }

@@ -2,11 +2,11 @@
 
 use super::finding::{Detail, Findings};
 use super::frames::{FrameEntry, FrameIndex};
-use super::groups::GroupsOfLine;
 use super::ids::Unknown;
 use super::mix::{Mix, mix, shown};
 use super::rules::RuleId;
-use crate::structure::{CELL_SIZE_PX, Record};
+use super::world::World;
+use crate::structure::{CELL_SIZE_PX, Record, angle, median, ray, shared};
 
 /// What one frame shows of one table.
 #[derive(Clone, Debug, Default)]
@@ -17,6 +17,19 @@ pub(crate) struct FrameCount {
     pub(crate) cells: Vec<u32>,
     /// Lines beyond the first of each group.
     pub(crate) constraints: i64,
+    /// Ends of segments, pixels.
+    pub(crate) segments: Vec<[[f64; 2]; 2]>,
+    /// Landmarks that the frame before shows too.
+    pub(crate) shared: u64,
+    /// Median angle between the rays to the points that the frame before shows too, radians.
+    pub(crate) parallax: Option<f64>,
+}
+
+/// What a row shows of its landmark.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Pixels {
+    Point([f64; 2]),
+    Segment([[f64; 2]; 2]),
 }
 
 /// Keeps the books of a per-frame table while its rows go by.
@@ -31,13 +44,21 @@ pub(crate) struct FrameRows<'a> {
     counts: Option<Counts<'a>>,
 }
 
+/// Where a frame shows a point; `None` for a line.
+type Pixel = Option<[f64; 2]>;
+
 struct Counts<'a> {
-    groups: &'a GroupsOfLine,
+    world: &'a World<'a>,
     frames: Vec<FrameCount>,
     current: usize,
     rows: u64,
     cells: Vec<u32>,
+    segments: Vec<[[f64; 2]; 2]>,
     grouped: Vec<i64>,
+    /// Landmarks of the current frame with their pixels, where they are points.
+    landmarks: Vec<(i64, Pixel)>,
+    /// Those of a frame before it.
+    before: (usize, Vec<(i64, Pixel)>),
 }
 
 /// What the books say in the end.
@@ -48,19 +69,19 @@ pub(crate) struct Books {
 
 impl<'a> FrameRows<'a> {
     /// * `hashed` — whether correspondences will be held against the rows.
-    /// * `groups` — where what each frame shows is to be counted.
-    pub(crate) fn new<R: Record>(
-        frames: &'a FrameIndex,
-        hashed: bool,
-        groups: Option<&'a GroupsOfLine>,
-    ) -> Self {
-        let counts = groups.map(|groups| Counts {
-            groups,
+    /// * `counted` — whether what each frame shows is to be counted.
+    pub(crate) fn new<R: Record>(world: &'a World<'a>, hashed: bool, counted: bool) -> Self {
+        let frames = world.frames;
+        let counts = counted.then(|| Counts {
+            world,
             frames: vec![FrameCount::default(); frames.len()],
             current: usize::MAX,
             rows: 0,
             cells: Vec::new(),
+            segments: Vec::new(),
             grouped: Vec::new(),
+            landmarks: Vec::new(),
+            before: (usize::MAX, Vec::new()),
         });
         Self {
             frames,
@@ -92,18 +113,28 @@ impl<'a> FrameRows<'a> {
         place.map(|place| (place, self.frames.entry(place)))
     }
 
-    /// Counts a row of a frame: its pixels, and the line that it shows if it shows one.
+    /// Counts a row of a frame: its landmark and where it shows it.
     #[inline]
-    pub(crate) fn count(&mut self, place: usize, pixels: &[[f64; 2]], line: Option<i64>) {
+    pub(crate) fn count(&mut self, place: usize, landmark: i64, pixels: Pixels) {
         let Some(counts) = &mut self.counts else { return };
         if counts.current != place {
             counts.flush();
             counts.current = place;
         }
         counts.rows += 1;
-        counts.cells.extend(pixels.iter().map(cell));
-        if let Some(groups) = line.and_then(|line| counts.groups.get(&line)) {
-            counts.grouped.extend_from_slice(groups);
+        match pixels {
+            Pixels::Point(pixel) => {
+                counts.cells.push(cell(&pixel));
+                counts.landmarks.push((landmark, Some(pixel)));
+            }
+            Pixels::Segment(ends) => {
+                counts.cells.extend(ends.iter().map(cell));
+                counts.segments.push(ends);
+                counts.landmarks.push((landmark, None));
+                if let Some(groups) = counts.world.groups.get(&landmark) {
+                    counts.grouped.extend_from_slice(groups);
+                }
+            }
         }
     }
 
@@ -157,6 +188,11 @@ impl<'a> FrameRows<'a> {
 impl Counts<'_> {
     /// Puts what was gathered into its frame.
     fn flush(&mut self) {
+        let landmarks = std::mem::take(&mut self.landmarks);
+        let (before, others) = std::mem::replace(&mut self.before, (self.current, landmarks.clone()));
+        let both =
+            if self.current.checked_sub(1) == Some(before) { shared(others, landmarks) } else { Vec::new() };
+        let parallax = both.first().and_then(|_| self.parallax(before, &both));
         if let Some(frame) = self.frames.get_mut(self.current) {
             frame.rows += self.rows;
             frame.cells.append(&mut self.cells);
@@ -166,11 +202,29 @@ impl Counts<'_> {
             let lines = i64::try_from(self.grouped.len()).unwrap_or(i64::MAX);
             self.grouped.sort_unstable();
             self.grouped.dedup();
+            frame.segments.append(&mut self.segments);
+            frame.shared = both.len() as u64;
+            frame.parallax = parallax;
             frame.constraints += lines - i64::try_from(self.grouped.len()).unwrap_or(i64::MAX);
         }
         self.rows = 0;
         self.cells.clear();
+        self.segments.clear();
         self.grouped.clear();
+    }
+
+    /// Median angle between the rays to the points of the current frame and one before it.
+    fn parallax(&self, before: usize, both: &[(Pixel, Pixel)]) -> Option<f64> {
+        let sight = |place: usize| {
+            let entry = self.world.frames.entry(place);
+            Some((self.world.views[entry.camera?].as_ref()?.pinhole, entry.pose?.rotation))
+        };
+        let ((from_camera, from), (to_camera, to)) = (sight(before)?, sight(self.current)?);
+        let angles = both.iter().filter_map(|(one, other)| {
+            let one = from.tr_mul(&ray(&from_camera, (*one)?));
+            Some(angle(&one, &to.tr_mul(&ray(&to_camera, (*other)?))))
+        });
+        median(&mut angles.collect())
     }
 }
 

@@ -2,21 +2,22 @@
 
 use super::finding::{Detail, Findings};
 use super::frame_rows::FrameCount;
-use super::frames::FrameIndex;
 use super::ids::Unknown;
 use super::rules::RuleId;
 use super::tables::{Outcome, Shared, check};
-use crate::structure::{FrameStatistics, Record};
+use super::world::World;
+use crate::structure::{FrameStatistics, ImageCells, Record};
 
 /// Checks the table; `points` and `lines` are `None` where their tables could not be counted.
 pub(crate) fn frame_statistics(
     shared: &Shared<'_>,
-    frames: &FrameIndex,
+    world: &World<'_>,
     points: Option<&[FrameCount]>,
     lines: Option<&[FrameCount]>,
     findings: &mut Findings,
 ) -> Outcome {
-    let table = FrameStatistics::TABLE.name;
+    let (table, frames) = (FrameStatistics::TABLE.name, world.frames);
+    let mut images: Vec<Option<ImageCells>> = world.views.iter().map(|_| None).collect();
     let mut unknown = Unknown::default();
     let mut described = vec![false; frames.len()];
     let mut hint = 0;
@@ -28,7 +29,21 @@ pub(crate) fn frame_statistics(
             };
             described[place] = true;
             if let (Some(points), Some(lines)) = (points, lines) {
-                hold(statistics, &points[place], &lines[place], row, findings);
+                let mut wrong = |column: &str, found: String, expected: String| {
+                    findings.add(RuleId::FrameStatisticsAgree, Some(table), || {
+                        let found = format!("{column} {found}");
+                        Detail::new(format!("{column} {expected}"), found).row(row).id(statistics.frame_id)
+                    });
+                };
+                hold(statistics, &points[place], &lines[place], &mut wrong);
+                hold_covered(
+                    statistics,
+                    &points[place],
+                    &lines[place],
+                    (world, place, &mut images),
+                    &mut wrong,
+                );
+                hold_step(statistics, &points[place], &lines[place], (world, place), &mut wrong);
             }
         }
     });
@@ -43,14 +58,13 @@ pub(crate) fn frame_statistics(
     outcome
 }
 
-fn hold(
-    statistics: &FrameStatistics,
-    points: &FrameCount,
-    lines: &FrameCount,
-    row: u64,
-    findings: &mut Findings,
-) {
-    let count = |count: u64| i64::try_from(count).unwrap_or(i64::MAX);
+/// Says that a column is wrong: its name, what was found, what was expected.
+type Wrong<'a> = dyn FnMut(&str, String, String) + 'a;
+
+/// How far angles and lengths may be off: double precision leaves 1e-8 to an angle taken from a cosine.
+const TOLERANCE: f64 = 1e-6;
+
+fn hold(statistics: &FrameStatistics, points: &FrameCount, lines: &FrameCount, wrong: &mut Wrong<'_>) {
     for (column, found, expected) in [
         ("point_count", statistics.point_count, count(points.rows)),
         ("line_count", statistics.line_count, count(lines.rows)),
@@ -58,12 +72,110 @@ fn hold(
         ("structural_constraints", statistics.structural_constraints, lines.constraints),
     ] {
         if found != expected {
-            findings.add(RuleId::FrameStatisticsAgree, Some(FrameStatistics::TABLE.name), || {
-                let found = format!("{column} {found}");
-                Detail::new(format!("{column} {expected}"), found).row(row).id(statistics.frame_id)
-            });
+            wrong(column, found.to_string(), expected.to_string());
         }
     }
+}
+
+/// Holds the covered cells, where they are given, against the pixels of the frame.
+fn hold_covered(
+    statistics: &FrameStatistics,
+    points: &FrameCount,
+    lines: &FrameCount,
+    (world, place, images): (&World<'_>, usize, &mut [Option<ImageCells>]),
+    wrong: &mut Wrong<'_>,
+) {
+    let Some(found) = statistics.covered_cells else { return };
+    let Some(camera) = world.frames.entry(place).camera else { return };
+    let Some(view) = &world.views[camera] else { return };
+    if images[camera].is_none() {
+        images[camera] = ImageCells::new(view.pinhole.width, view.pinhole.height);
+    }
+    let Some(image) = &mut images[camera] else {
+        return wrong("covered_cells", found.to_string(), "absent for so large an image".to_owned());
+    };
+    image.clear();
+    for [column, row] in points.cells.iter().map(|cell| [cell >> 16, cell & 0xffff]) {
+        image.cover(i64::from(column), i64::from(row));
+    }
+    for [start, end] in &lines.segments {
+        image.cover_segment(*start, *end);
+    }
+    let expected = count(image.covered() as u64);
+    if found != expected {
+        wrong("covered_cells", found.to_string(), expected.to_string());
+    }
+}
+
+/// Holds what is said of a frame and the one before it, where it is given.
+fn hold_step(
+    statistics: &FrameStatistics,
+    points: &FrameCount,
+    lines: &FrameCount,
+    (world, place): (&World<'_>, usize),
+    wrong: &mut Wrong<'_>,
+) {
+    let frames = world.frames;
+    if !frames.ordered {
+        return;
+    }
+    let before = place.checked_sub(1);
+    for (column, found, expected) in [
+        ("points_shared_with_previous", statistics.points_shared_with_previous, points.shared),
+        ("lines_shared_with_previous", statistics.lines_shared_with_previous, lines.shared),
+    ] {
+        let expected = before.map(|_| count(expected));
+        if found.is_some() && found != expected {
+            wrong(column, text(found), text(expected));
+        }
+    }
+    // What a pose or a camera that cannot be used would give is another rule's finding.
+    let usable = |place: usize| {
+        let entry = frames.entry(place);
+        let camera = entry.camera.is_some_and(|camera| world.views[camera].is_some());
+        (entry.pose.is_some() || entry.without_pose, camera)
+    };
+    let (posed, sighted) = match before.map(usable).zip(Some(usable(place))) {
+        Some((before, here)) => (before.0 && here.0, before.1 && here.1),
+        None => (true, true),
+    };
+    if !posed {
+        return;
+    }
+    let poses = before.and_then(|before| frames.entry(before).pose.zip(frames.entry(place).pose));
+    let rotation = poses.map(|(before, here)| {
+        let turn = before.rotation * here.rotation.transpose();
+        let axis = [turn.m32 - turn.m23, turn.m13 - turn.m31, turn.m21 - turn.m12];
+        let sine = axis.iter().map(|part| part * part).sum::<f64>().sqrt();
+        libm::atan2(sine, turn.trace() - 1.0)
+    });
+    let centres =
+        poses.map(|(before, here)| [before, here].map(|pose| pose.rotation.tr_mul(&pose.translation)));
+    let translation = centres.map(|[before, here]| (here - before).norm());
+    // Far from the origin a difference of places has their rounding.
+    let rounding = centres.map_or(0.0, |[before, here]| 1e-12 * (before.norm() + here.norm()));
+    let mut hold = |column: &str, found: Option<f64>, expected: Option<f64>, tolerance: f64| {
+        // What is not finite is another rule's finding.
+        let Some(found) = found.filter(|found| found.is_finite()) else { return };
+        if expected.is_none_or(|expected| (found - expected).abs() > tolerance) {
+            wrong(column, found.to_string(), text(expected));
+        }
+    };
+    hold("rotation_since_previous", statistics.rotation_since_previous, rotation, TOLERANCE);
+    let moved = statistics.translation_since_previous;
+    hold("translation_since_previous", moved, translation, TOLERANCE + rounding);
+    if sighted {
+        let parallax = statistics.median_parallax_to_previous;
+        hold("median_parallax_to_previous", parallax, points.parallax, TOLERANCE);
+    }
+}
+
+fn count(count: u64) -> i64 {
+    i64::try_from(count).unwrap_or(i64::MAX)
+}
+
+fn text(number: Option<impl ToString>) -> String {
+    number.map_or_else(|| "absent".to_owned(), |number| number.to_string())
 }
 
 /// Number of different cells in two ascending lists.

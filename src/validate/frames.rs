@@ -51,6 +51,8 @@ pub(crate) struct FrameEntry {
     /// Place of the camera in the manifest.
     pub(crate) camera: Option<usize>,
     pub(crate) pose: Option<CameraFromWorld>,
+    /// Whether the pose is not known, rather than one that cannot be used.
+    pub(crate) without_pose: bool,
 }
 
 /// The frames of a sequence by id.
@@ -58,6 +60,8 @@ pub(crate) struct FrameEntry {
 pub(crate) struct FrameIndex {
     index: IdIndex,
     entries: Vec<FrameEntry>,
+    /// Whether the table is in order, so that the frame before another one is the one before it here.
+    pub(crate) ordered: bool,
     /// Stamps of the first and the last frame in table order.
     pub(crate) first_and_last_stamp: Option<(i64, i64)>,
 }
@@ -128,13 +132,15 @@ pub(crate) fn frames(
                 place
             });
             let pose = pose(frame, row, findings);
-            rows.push((frame.frame_id.0, FrameEntry { stamp, camera, pose }));
+            let without_pose = frame.pose_columns().iter().all(Option::is_none);
+            rows.push((frame.frame_id.0, FrameEntry { stamp, camera, pose, without_pose }));
         }
     });
     rows.sort_by_key(|(id, _)| *id);
     rows.dedup_by_key(|(id, _)| *id);
     let (ids, entries) = rows.into_iter().unzip();
-    (FrameIndex { index: IdIndex::new(ids), entries, first_and_last_stamp: stamps }, outcome)
+    let ordered = outcome.ordered;
+    (FrameIndex { index: IdIndex::new(ids), entries, ordered, first_and_last_stamp: stamps }, outcome)
 }
 
 fn stamp_in_order(before: Option<i64>, stamp: i64, row: u64, frame: &Frame, findings: &mut Findings) {

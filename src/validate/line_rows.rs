@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Vector3, Vector4};
 
 use super::finding::{Detail, Findings};
 use super::fit::Fit;
-use super::frame_rows::FrameRows;
+use super::frame_rows::{FrameRows, Pixels};
 use super::frames::{CameraFromWorld, View};
 use super::ids::Unknown;
 use super::landmarks::LineEntry;
@@ -163,7 +163,7 @@ pub(crate) fn lines<R: LineRow>(
     let table = R::TABLE.name;
     let movable: Vec<Option<Movable>> =
         world.lines.map_or_else(Vec::new, |lines| lines.places.iter().map(Movable::new).collect());
-    let mut books = FrameRows::new::<R>(world.frames, hashed, counted.then_some(world.groups));
+    let mut books = FrameRows::new::<R>(world, hashed, counted);
     let mut unknown = Unknown::default();
     let (mut shown, mut fits) = (vec![false; movable.len()], vec![Fit::<4>::default(); movable.len()]);
     let (mut sample, mut astray) = (Sample::default(), HashMap::new());
@@ -183,7 +183,7 @@ pub(crate) fn lines<R: LineRow>(
                 place
             });
             let Some((place, frame)) = frame else { continue };
-            books.count(place, &ends.map(|end| end.pixel), Some(line_id));
+            books.count(place, line_id, Pixels::Segment(ends.map(|end| end.pixel)));
             let Some(view) = frame.camera.and_then(|camera| world.views[camera].as_ref()) else { continue };
             for end in ends.iter().filter(|end| !view.contains(end.pixel[0], end.pixel[1], margin)) {
                 outside(view, end.pixel, margin, table, row, &format!("line {line_id}"), findings);

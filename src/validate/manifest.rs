@@ -9,6 +9,7 @@ use super::finding::{Detail, Findings};
 use super::frames::View;
 use super::rules::{RuleId, version_numbers};
 use crate::format::json_schema;
+use crate::structure::registry::SPEC_VERSION;
 use crate::structure::{Camera, Clock, Conventions, Noise, Source, TableSummary, registry};
 
 /// Major version whose files can be judged.
@@ -34,6 +35,11 @@ impl Known {
     /// Whether the declared version is one that cannot be judged.
     pub(crate) fn is_of_another_age(&self) -> bool {
         self.spec_version.as_deref().and_then(version_numbers).is_some_and(|version| version.0 != MAJOR)
+    }
+
+    /// Whether the declared version is a later one than that of this code.
+    pub(crate) fn is_younger(&self) -> bool {
+        self.spec_version.as_deref().and_then(version_numbers) > version_numbers(SPEC_VERSION)
     }
 }
 
@@ -127,7 +133,11 @@ fn unknown_fields(schema: &Value, value: &Value, place: &str, findings: &mut Fin
                     unknown_fields(schema, field, &inner, findings);
                 } else {
                     findings.add(RuleId::UnknownContent, None, || {
-                        Detail::new("fields of version 1.0.0", "another one in the manifest").id(inner)
+                        Detail::new(
+                            format!("fields of version {SPEC_VERSION}"),
+                            "another one in the manifest",
+                        )
+                        .id(inner)
                     });
                 }
             }

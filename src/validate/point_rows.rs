@@ -6,7 +6,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::finding::{Detail, Findings};
 use super::fit::Fit;
-use super::frame_rows::{Books, FrameRows};
+use super::frame_rows::{Books, FrameRows, Pixels};
 use super::frames::{CameraFromWorld, View};
 use super::ids::Unknown;
 use super::noise::{Residual, Sample};
@@ -88,7 +88,7 @@ pub(crate) fn points<R: PointRow>(
 ) -> Seen<3> {
     let table = R::TABLE.name;
     let count = world.points.map_or(0, |points| points.places.len());
-    let mut books = FrameRows::new::<R>(world.frames, hashed, counted.then_some(world.groups));
+    let mut books = FrameRows::new::<R>(world, hashed, counted);
     let mut unknown = Unknown::default();
     let (mut shown, mut fits) = (vec![false; count], vec![Fit::<3>::default(); count]);
     let (mut sample, mut astray) = (Sample::default(), HashMap::new());
@@ -113,7 +113,7 @@ pub(crate) fn points<R: PointRow>(
                 place.map(|place| (place, u32::try_from(place).unwrap_or(u32::MAX), points.places[place]))
             });
             let Some((place, frame)) = frame else { continue };
-            books.count(place, &[[u, v]], None);
+            books.count(place, point_id, Pixels::Point([u, v]));
             let Some(view) = frame.camera.and_then(|camera| world.views[camera].as_ref()) else { continue };
             if !view.contains(u, v, margin) {
                 outside(view, [u, v], margin, table, row, &format!("point {point_id}"), findings);

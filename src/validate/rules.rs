@@ -222,7 +222,7 @@ rules! {
         "Information matrices MUST be positive semi-definite.",
         None, "1.0.0";
     FrameStatisticsAgree: "frame-statistics-agree", Error, "6.15",
-        "`frame_statistics` MUST have one row for each frame, with the counts that its definition gives.",
+        "`frame_statistics` MUST have one row for each frame, with the numbers that its definition gives: counts exactly, angles and lengths within 1e-6 rad and m.",
         None, "1.0.0";
     PointObservationsReproject: "point-observations-reproject", Error, "7",
         "A noise-free point observation MUST lie within 0.5 px of its landmark's image through the true pose, and its depth within 1 cm or 1 %.",

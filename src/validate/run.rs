@@ -166,7 +166,7 @@ fn judge_together(
     }
     let point_counts = counts(&measured_points, &observed_points);
     let line_counts = counts(&measured_lines, &observed_lines);
-    let statistics = frame_statistics(shared, world.frames, point_counts, line_counts, findings);
+    let statistics = frame_statistics(shared, world, point_counts, line_counts, findings);
     *names = read.names;
     let mut outcomes = read.others;
     outcomes.extend([

@@ -13,6 +13,7 @@ use super::source::Source;
 use super::tables::{Progress, Shared, damaged};
 use super::{Error, Options, container};
 use crate::format::{self, Encoding, McapSurvey, SequenceReader, survey_file};
+use crate::structure::registry::SPEC_VERSION;
 use crate::structure::{Sequence, Storage, TABLES, TableInfo, TableSummary, for_each_table};
 
 /// Validates what stands at a path.
@@ -137,7 +138,8 @@ fn opened(
     let unknown = if is_mcap { "topic" } else { "file" };
     for name in reader.passed_over() {
         findings.add(RuleId::UnknownContent, None, || {
-            Detail::new(format!("{unknown}s of version 1.0.0"), "another one").id(format!("{unknown} {name}"))
+            Detail::new(format!("{unknown}s of version {SPEC_VERSION}"), "another one")
+                .id(format!("{unknown} {name}"))
         });
     }
     if !present.contains(&"frames") {
@@ -161,11 +163,13 @@ fn opened(
     }
 
     let total = expected_rows(reader, summaries.as_deref());
+    let undigested = if known.is_younger() { with_unknown_columns(reader) } else { BTreeSet::new() };
     let shared = Shared {
         source: Source::Stored(reader),
         summaries: Some(summaries.as_deref().unwrap_or_default()),
         present: present.iter().copied().collect(),
         skipped,
+        undigested,
         progress: Progress::new(total, options.progress),
     };
     let (survey, tables): (Option<McapSurvey>, Tables) =
@@ -205,7 +209,8 @@ fn columns(reader: &SequenceReader, findings: &mut Findings) -> BTreeSet<&'stati
         let table = stored.table.name;
         for column in &stored.unknown_columns {
             findings.add(RuleId::UnknownContent, Some(table), || {
-                Detail::new("columns of version 1.0.0", "another one").id(format!("column {column}"))
+                Detail::new(format!("columns of version {SPEC_VERSION}"), "another one")
+                    .id(format!("column {column}"))
             });
         }
         for column in &stored.missing_columns {
@@ -223,6 +228,12 @@ fn columns(reader: &SequenceReader, findings: &mut Findings) -> BTreeSet<&'stati
         }
     }
     skipped
+}
+
+/// Tables with columns that this version does not know.
+fn with_unknown_columns(reader: &SequenceReader) -> BTreeSet<&'static str> {
+    let tables = reader.tables().into_iter();
+    tables.filter(|stored| !stored.unknown_columns.is_empty()).map(|stored| stored.table.name).collect()
 }
 
 fn expected_rows(reader: &SequenceReader, summaries: Option<&[TableSummary]>) -> u64 {
@@ -274,6 +285,7 @@ pub(crate) fn validate_sequence(sequence: &Sequence, options: &Options<'_>) -> R
         summaries: None,
         present,
         skipped: BTreeSet::new(),
+        undigested: BTreeSet::new(),
         progress: Progress::new(total, options.progress),
     };
     let tables = run(&shared, &known, findings.fresh());

@@ -39,11 +39,16 @@ pub(crate) fn columns(name: &str) -> Option<String> {
     let table = table_info(name)?;
     let mut text = format!("{}\n\nKey: {}.\n\n", table.description(), key(table));
     text.push_str("| name | type | unit | space | meaning |\n|---|---|---|---|---|\n");
-    for Field { name, kind, nullable, unit, space, .. } in table.fields {
+    for Field { name, kind, nullable, unit, space, since, .. } in table.fields {
         let description = table.fields.iter().find(|field| field.name == *name)?.description();
         let nullable = if *nullable { ", nullable" } else { "" };
+        let since = if *since == "1.0.0" { String::new() } else { format!(", since {since}") };
         let kind = kind.name();
-        let _ = writeln!(text, "| `{name}` | {kind}{nullable} | {unit} | {space} | {} |", cell(&description));
+        let _ = writeln!(
+            text,
+            "| `{name}` | {kind}{nullable}{since} | {unit} | {space} | {} |",
+            cell(&description)
+        );
     }
     Some(text)
 }

@@ -135,7 +135,6 @@ pub fn convert(text: &TextSequence, options: &Options) -> Result<Converted, Erro
     sequence.line_correspondences =
         line_correspondences(&sequence.line_measurements, &sequence.line_observations);
     sequence.sort();
-    sequence.frame_statistics = frame_statistics(&sequence);
 
     let depths = line_tables
         .measurements
@@ -163,6 +162,8 @@ pub fn convert(text: &TextSequence, options: &Options) -> Result<Converted, Erro
         notes,
     };
     sequence.manifest = manifest(text, &sequence, &findings, options);
+    // After the manifest, whose cameras are needed.
+    sequence.frame_statistics = frame_statistics(&sequence);
     Ok(Converted { sequence, findings })
 }
 

@@ -212,7 +212,7 @@ impl PropertyAccess for Element {
 }
 
 fn read_ply(reader: impl BufRead) -> Result<Soup, (Option<usize>, String)> {
-    let failed = |error: ply_rs_bw::parser::Error| (error.line(), error.to_string());
+    let failed = |error: ply_rs_bw::parser::ParseError| (error.line(), error.to_string());
     let mut reader = Reader::new(reader);
     let parser = Parser::<Element>::new();
     let header = parser.read_header(&mut reader).map_err(failed)?;

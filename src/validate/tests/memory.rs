@@ -69,7 +69,17 @@ fn the_rules_of_frames_and_poses_are_told_apart() {
     breaks_only("pose-whole", |s| s.frames[3].world_from_camera_qx = None);
     breaks_only("quaternion-unit", |s| s.trajectories[3].world_from_camera_qw *= 1.01);
     breaks_only("quaternion-unit", |s| s.graph_poses[3].world_from_camera_qw *= 1.01);
-    breaks_only("quaternion-unit", |s| s.frames[3].world_from_camera_qw.as_mut().map_or((), |w| *w *= 1.002));
+    breaks_only("quaternion-unit", |s| {
+        let frame = &mut s.frames[3];
+        for part in [
+            &mut frame.world_from_camera_qx,
+            &mut frame.world_from_camera_qy,
+            &mut frame.world_from_camera_qz,
+            &mut frame.world_from_camera_qw,
+        ] {
+            *part = part.map(|part| part * 1.002);
+        }
+    });
 }
 
 #[test]
@@ -242,6 +252,14 @@ fn the_rules_of_graphs_are_told_apart() {
 #[test]
 fn frame_statistics_are_held_against_what_frames_show() {
     breaks_only("frame-statistics-agree", |s| s.frame_statistics[3].occupied_cells += 1);
+    breaks_only("frame-statistics-agree", |s| {
+        s.frame_statistics[3].covered_cells = s.frame_statistics[3].covered_cells.map(|cells| cells + 1);
+    });
+    breaks_only("frame-statistics-agree", |s| {
+        let angle = &mut s.frame_statistics[3].median_parallax_to_previous;
+        *angle = angle.map(|angle| angle + 1e-5);
+    });
+    breaks_only("frame-statistics-agree", |s| s.frame_statistics[0].translation_since_previous = Some(0.0));
     breaks_only("frame-statistics-agree", |s| s.frame_statistics[3].structural_constraints -= 1);
     breaks_only("frame-statistics-agree", |s| {
         s.frame_statistics.remove(3);

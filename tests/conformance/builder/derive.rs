@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
 use super::document::{Cell, Document, Table};
+use super::step;
 
 /// Tables that are computed here; edits of them come after.
 pub(crate) const DERIVED: [&str; 3] = ["point_correspondences", "line_correspondences", "frame_statistics"];
@@ -79,18 +80,26 @@ fn statistics(document: &Document) -> Vec<Vec<Cell>> {
         lists.collect()
     });
     let count = |length: usize| i64::try_from(length).unwrap_or(i64::MAX);
+    let frames: Vec<i64> = tallies.keys().copied().collect();
+    let counted = [
+        first(document, ["point_measurements", "point_observations"]),
+        first(document, ["line_measurements", "line_observations"]),
+    ];
     tallies
         .into_iter()
-        .map(|(frame, tally)| {
+        .enumerate()
+        .map(|(index, (frame, tally))| {
             let seen = groups.iter().map(|lines| count(lines.intersection(&tally.lines).count()));
             let constraints: i64 = seen.filter(|lines| *lines > 0).map(|lines| lines - 1).sum();
-            vec![
+            let mut row = vec![
                 frame.into(),
                 tally.points.into(),
                 count(tally.lines.len()).into(),
                 count(tally.cells.len()).into(),
                 constraints.into(),
-            ]
+            ];
+            row.extend(step::columns(document, counted, &frames, index));
+            row
         })
         .collect()
 }
@@ -116,6 +125,13 @@ fn digest(table: &Table) -> String {
 }
 
 fn put(field: &Field, cell: &Cell, bytes: &mut Vec<u8>) {
+    if field.since != "1.0.0" {
+        if cell.is_null() {
+            return;
+        }
+        bytes.extend((field.name.len() as u64).to_le_bytes());
+        bytes.extend(field.name.as_bytes());
+    }
     if field.nullable {
         bytes.push(u8::from(!cell.is_null()));
     }

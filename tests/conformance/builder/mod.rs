@@ -14,6 +14,7 @@ mod mcap_file;
 mod noise;
 mod parquet_files;
 mod scene;
+mod step;
 mod view;
 
 use std::fs;

@@ -1,0 +1,22 @@
+//! Pictures of sequences, as SVG: a scene with its trajectory, and statistics over frames.
+
+mod error;
+mod scene;
+mod statistics_figure;
+mod svg;
+mod view;
+
+pub use error::Error;
+pub use scene::{Scene, scene_picture};
+pub use statistics_figure::statistics_figure;
+pub use view::ViewFrom;
+
+/// Background, so that a picture is readable on a dark page too.
+const PAPER: &str = "#ffffff";
+/// Text and the camera's path.
+const INK: &str = "#1a1a1a";
+/// What is there without meaning much.
+const QUIET: &str = "#8c8c8c";
+/// Colours that are told apart with any kind of sight (Okabe and Ito 2008), without black and yellow.
+const COLOURS: [&str; 6] = ["#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
+const FONT: &str = "font-family=\"Helvetica, Arial, DejaVu Sans, sans-serif\"";

@@ -5,11 +5,13 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use clap::ValueEnum;
+use nalgebra::Point3;
 
 use super::{Outcome, stats, text};
 use crate::format;
 use crate::plot::{Scene, ViewFrom, scene_picture, statistics_figure};
-use crate::structure::{LineLandmark, PointLandmark, StructuralGroup};
+use crate::simulate::{self, Recipe};
+use crate::structure::{LineLandmark, Manifest, PointLandmark, StructuralGroup};
 
 /// Draw a sequence as SVG: its scene with the camera's path, or statistics over its frames.
 #[derive(clap::Args, Debug)]
@@ -72,7 +74,9 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
             let reader = format::open(&args.sequence)?;
             let (points, lines) = (reader.table::<PointLandmark>()?, reader.table::<LineLandmark>()?);
             let groups = reader.table::<StructuralGroup>()?;
+            let edges = edges(reader.manifest());
             let scene = Scene {
+                edges: &edges,
                 manifest: reader.manifest(),
                 frames: reader.frame_list()?,
                 points: &points,
@@ -97,6 +101,15 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     let size = fs::metadata(output).map_or(0, |found| found.len());
     writeln!(stdout, "{}: {}", output.display(), text::bytes(size))?;
     Ok(Outcome::Done)
+}
+
+/// Edges of a simulated scene, made again from the recipe in the manifest; none where that cannot be done, as
+/// with a mesh that is not here.
+fn edges(manifest: &Manifest) -> Vec<[Point3<f64>; 2]> {
+    let recipe = manifest.generator.parameters.get("recipe");
+    let recipe: Option<Recipe> = recipe.and_then(|text| serde_json::from_str(text).ok());
+    let scene = recipe.and_then(|recipe| simulate::scene::Scene::build(&recipe.scene, "".as_ref()).ok());
+    scene.map(|scene| scene.edges.iter().map(|edge| [edge.start, edge.end]).collect()).unwrap_or_default()
 }
 
 impl Args {

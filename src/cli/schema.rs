@@ -6,6 +6,7 @@ use anyhow::Context;
 
 use super::{Outcome, text};
 use crate::format;
+use crate::simulate::Recipe;
 use crate::structure::{TABLES, table_info};
 use crate::validate;
 
@@ -16,7 +17,7 @@ use crate::validate;
   os schema point_measurements           JSON Schema of a row
   os schema point_measurements --columns types, units and spaces of the columns")]
 pub(super) struct Args {
-    /// Table name, `manifest`, `table_summaries` or `validation_report`; without it, all names are listed.
+    /// Table name, `manifest`, `table_summaries`, `recipe` or `validation_report`; without it, all names are listed.
     name: Option<String>,
     /// List the columns with type, unit, space and meaning.
     #[arg(long, requires = "name")]
@@ -33,6 +34,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
             let sentence = description.split_inclusive(". ").next().unwrap_or_default().trim();
             table.add_row([info.name, sentence]);
         }
+        table.add_row(["recipe", "What `os simulate` makes a sequence of."]);
         table.add_row(["validation_report", "What `os validate --json` prints."]);
         writeln!(stdout, "{}", text::lines(&table))?;
         return Ok(Outcome::Done);
@@ -54,8 +56,11 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         )?;
         return Ok(Outcome::Done);
     }
-    let schema =
-        if name == "validation_report" { Some(validate::report_schema()) } else { format::json_schema(name) };
+    let schema = match name.as_str() {
+        "validation_report" => Some(validate::report_schema()),
+        "recipe" => Some(Recipe::json_schema()),
+        name => format::json_schema(name),
+    };
     let schema = schema.with_context(|| format!("there is no schema `{name}`; try `os schema`"))?;
     write!(stdout, "{schema}")?;
     Ok(Outcome::Done)

@@ -17,6 +17,8 @@ const PAPER: &str = "#ffffff";
 const INK: &str = "#1a1a1a";
 /// What is there without meaning much.
 const QUIET: &str = "#8c8c8c";
+/// What stands behind everything else.
+const FAINT: &str = "#cfd4d8";
 /// Colours that are told apart with any kind of sight (Okabe and Ito 2008), without black and yellow.
 const COLOURS: [&str; 6] = ["#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
 const FONT: &str = "font-family=\"Helvetica, Arial, DejaVu Sans, sans-serif\"";

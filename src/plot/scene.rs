@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 
 use super::error::Error;
 use super::svg::Svg;
 use super::view::{Plane, ViewFrom, upward};
-use super::{COLOURS, INK, PAPER, QUIET};
+use super::{COLOURS, FAINT, INK, PAPER, QUIET};
 use crate::structure::{Frame, GroupId, LineId, LineLandmark, Manifest, PointLandmark, StructuralGroup};
 
 const WIDTH: f64 = 1200.0;
@@ -37,12 +37,15 @@ pub struct Scene<'a> {
     pub lines: &'a [LineLandmark],
     /// Groups, which give lines their colours.
     pub groups: &'a [StructuralGroup],
+    /// Edges of the objects of a simulated scene, `world`, metres; drawn faintly.
+    pub edges: &'a [[Point3<f64>; 2]],
 }
 
 /// The shapes of a scene in the plane of the picture, metres.
 struct Shapes {
     dots: Vec<[f64; 2]>,
     lines: Vec<(LineId, [[f64; 2]; 2])>,
+    edges: Vec<[[f64; 2]; 2]>,
     path: Vec<[f64; 2]>,
     axes: [[f64; 2]; 3],
 }
@@ -66,6 +69,9 @@ pub fn scene_picture(scene: &Scene<'_>, view: ViewFrom) -> Result<String, Error>
         HEAD,
         HEIGHT - HEAD
     ));
+    let edges: Vec<[[f64; 2]; 2]> =
+        shapes.edges.iter().filter_map(|[start, end]| Some([fit.place(*start)?, fit.place(*end)?])).collect();
+    svg.strokes(edges.iter().map(<[_; 2]>::as_slice), 1.0, FAINT, 1.0);
     // Fewer points may be larger.
     let diameter = (9.0 - 1.4 * libm::log10(shapes.dots.len().max(1) as f64)).clamp(2.5, 6.0);
     svg.dots(shapes.dots.iter().filter_map(|dot| fit.place(*dot)), diameter, QUIET, 0.55);
@@ -98,6 +104,9 @@ fn shapes(scene: &Scene<'_>, plane: &Plane) -> Shapes {
                 let end = plane.place(Vector3::new(line.end_x, line.end_y, line.end_z))?;
                 Some((line.line_id, [start, end]))
             })
+            .collect(),
+        edges: thinned(scene.edges, MOST_LINES)
+            .filter_map(|[start, end]| Some([plane.place(start.coords)?, plane.place(end.coords)?]))
             .collect(),
         path: poses.filter_map(|pose| plane.place(Vector3::from(pose.translation))).collect(),
         axes: [0, 1, 2].map(|axis| [plane.right[axis], plane.up[axis]]),
@@ -299,7 +308,7 @@ mod tests {
 
     fn picture(points: &[PointLandmark], frames: &[Frame]) -> Result<String, Error> {
         let manifest = Manifest { name: "<name>".to_owned(), ..Manifest::default() };
-        let scene = Scene { manifest: &manifest, frames, points, lines: &[], groups: &[] };
+        let scene = Scene { manifest: &manifest, frames, points, lines: &[], groups: &[], edges: &[] };
         scene_picture(&scene, ViewFrom::OBLIQUE)
     }
 
@@ -329,7 +338,8 @@ mod tests {
         let plane = Plane::new(ViewFrom::TOP, Vector3::z()).unwrap();
         let manifest = Manifest::default();
         let fit = |points: &[PointLandmark]| {
-            let scene = Scene { manifest: &manifest, frames: &[], points, lines: &[], groups: &[] };
+            let scene =
+                Scene { manifest: &manifest, frames: &[], points, lines: &[], groups: &[], edges: &[] };
             Fit::new(&shapes(&scene, &plane)).unwrap()
         };
         let before = fit(&points).scale;

@@ -17,7 +17,14 @@ struct Weighted {
 impl Weighted {
     fn new(weights: impl Iterator<Item = f64>) -> Self {
         let mut sum = 0.0;
-        Self { sums: weights.map(|weight| { sum += weight; sum }).collect() }
+        Self {
+            sums: weights
+                .map(|weight| {
+                    sum += weight;
+                    sum
+                })
+                .collect(),
+        }
     }
 
     fn total(&self) -> f64 {
@@ -52,7 +59,8 @@ impl<'a> PointSource<'a> {
 /// A point uniform on a face.
 fn point_on(face: &Face, random: &mut Random) -> Point3<f64> {
     let (first, second) = face.triangles();
-    let area = |corners: &[Point3<f64>; 3]| (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).norm();
+    let area =
+        |corners: &[Point3<f64>; 3]| (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).norm();
     let chosen = match second {
         Some(second) if random.uniform() * (area(&first) + area(&second)) >= area(&first) => second,
         _ => first,
@@ -148,7 +156,17 @@ impl<'a> LineSource<'a> {
             oblique.push(oblique_of_class[class].clone());
         }
         let face_weights = Weighted::new(scene.faces.iter().map(Face::area));
-        Self { scene, recipe, seed, families: families.list, edges, edge_weights, face_weights, along_sides, oblique }
+        Self {
+            scene,
+            recipe,
+            seed,
+            families: families.list,
+            edges,
+            edge_weights,
+            face_weights,
+            along_sides,
+            oblique,
+        }
     }
 
     /// The line of an index: the same whichever others are drawn.
@@ -158,11 +176,10 @@ impl<'a> LineSource<'a> {
     pub(super) fn line(&self, index: u64) -> Result<DrawnLine, Error> {
         let mut random = Random::new(self.seed, "line landmarks", index);
         for _ in 0..ATTEMPTS {
-            let kind = random.uniform();
-            let found = if kind < self.recipe.on_edges {
+            let found = if random.chance(self.recipe.on_edges) {
                 self.on_edge(&mut random)
             } else {
-                self.on_face(kind, &mut random)
+                self.on_face(&mut random)
             };
             if let Some(line) = found {
                 return Ok(line);
@@ -199,15 +216,16 @@ impl<'a> LineSource<'a> {
         DrawnLine { segment, family: Some(family) }
     }
 
-    fn on_face(&self, kind: f64, random: &mut Random) -> Option<DrawnLine> {
+    fn on_face(&self, random: &mut Random) -> Option<DrawnLine> {
         let recipe = self.recipe;
+        let kind = random.uniform();
         let face_index = self.face_weights.draw(random);
         let face = &self.scene.faces[face_index];
         let through = point_on(face, random);
-        let family = if kind < recipe.on_edges + recipe.oblique {
+        let family = if kind < recipe.oblique {
             let list = &self.oblique[face_index];
             Some(*list.get(random.index(list.len()))?)
-        } else if kind < recipe.on_edges + recipe.oblique + recipe.free {
+        } else if kind < recipe.oblique + recipe.free {
             None
         } else {
             let list = &self.along_sides[face_index];
@@ -230,7 +248,10 @@ impl<'a> LineSource<'a> {
         Some(match family {
             Some(family) => self.line_along(through, family, along, direction),
             None => DrawnLine {
-                segment: Segment { start: through + direction * along[0], end: through + direction * along[1] },
+                segment: Segment {
+                    start: through + direction * along[0],
+                    end: through + direction * along[1],
+                },
                 family: None,
             },
         })

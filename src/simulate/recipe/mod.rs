@@ -98,6 +98,18 @@ impl Recipe {
         Ok(recipe)
     }
 
+    /// The JSON Schema (2020-12) of a recipe; TOML has the same shape.
+    #[must_use]
+    pub fn json_schema() -> String {
+        let settings = schemars::generate::SchemaSettings::draft2020_12()
+            .with(|settings| settings.inline_subschemas = true);
+        let mut schema = settings.into_generator().into_root_schema_for::<Self>();
+        schema.insert("$id".to_owned(), "https://open-structure.github.io/recipe.schema.json".into());
+        let mut text = serde_json::to_string_pretty(schema.as_value()).unwrap_or_default();
+        text.push('\n');
+        text
+    }
+
     /// Looks at every number; files that the recipe names are looked at when they are read.
     ///
     /// # Errors
@@ -108,7 +120,11 @@ impl Recipe {
             && !self.name.contains(['/', '\\'])
             && !self.name.chars().any(char::is_control);
         if !named {
-            return Err(Error::value("name", "a name of 1 to 200 bytes, without slashes", format!("{:?}", self.name)));
+            return Err(Error::value(
+                "name",
+                "a name of 1 to 200 bytes, without slashes",
+                format!("{:?}", self.name),
+            ));
         }
         check_numbers("rate_hz", &[self.rate_hz], 1e-3, 1e6, "Hz")?;
         if self.min_observations == 0 {

@@ -1,4 +1,4 @@
-# make demo   build, convert the committed sample to both encodings, validate it, look at it
+# make demo   build, simulate a sequence, convert the committed sample, validate both, look at them
 # make test   every test
 # make lint   formatting, clippy, documentation, dependencies
 

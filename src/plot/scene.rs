@@ -245,7 +245,7 @@ fn words(svg: &mut Svg, scene: &Scene<'_>, colours: &[(GroupId, &'static str, us
     entries.push((QUIET, "in no group".to_owned()));
     if colours.len() > COLOURS.len() {
         entries
-            .push((PAPER, format!("and {} groups more, in the same colours", colours.len() - COLOURS.len())));
+            .push((PAPER, format!("and {} groups more", colours.len() - COLOURS.len())));
     }
     let mut left = MARGIN;
     for (colour, words) in &entries {

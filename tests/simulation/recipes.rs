@@ -175,3 +175,28 @@ fn the_schema_of_recipes_is_that_of_the_code_and_holds_every_recipe() {
         serde_json::json!({"name": "x", "trajectory": {"kind": "wave", "frames": 3}, "scene": [], "sead": 1});
     assert!(!validator.is_valid(&wrong));
 }
+
+#[test]
+fn the_recipe_of_the_readme_is_conformant() {
+    let readme = fs::read_to_string(root().join("sequences/README.md")).unwrap();
+    let recipe = readme.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let [path, output] = ["stairs.toml", "stairs"].map(|name| folder.path().join(name));
+    fs::write(&path, recipe).unwrap();
+    done(&["simulate", text(&path), "-o", text(&output)]);
+    done(&["validate", "--deny", "warnings", text(&output)]);
+}
+
+/// With `UPDATE_SPEC=1` the picture is drawn anew.
+#[test]
+fn the_picture_of_box1_is_what_the_program_draws() {
+    let folder = tempfile::tempdir().unwrap();
+    let [sequence, picture] = ["box1", "box1.svg"].map(|name| folder.path().join(name));
+    done(&["simulate", "box1", "-o", text(&sequence)]);
+    done(&["plot", text(&sequence), "-o", text(&picture)]);
+    let (drawn, path) = (fs::read_to_string(&picture).unwrap(), root().join("sequences/box1.svg"));
+    if std::env::var_os("UPDATE_SPEC").is_some() {
+        fs::write(&path, &drawn).unwrap();
+    }
+    assert!(fs::read_to_string(path).unwrap() == drawn, "`make spec` draws it");
+}

@@ -14,7 +14,9 @@ use crate::format::{self, SequenceReader};
 use crate::statistics::{
     Analysed, Analysis, Counted, Difference, Distribution, FeatureStatistics, SequenceStatistics,
 };
-use crate::structure::{FrameStatistics, LineMeasurement, PointMeasurement, Record, StructuralGroup};
+use crate::structure::{
+    FrameStatistics, LineMeasurement, MotionGrade, PointMeasurement, Record, StructuralGroup,
+};
 
 /// Show what sequences are like: features, tracks, covisibility, parallax, motion, noise.
 ///
@@ -78,12 +80,12 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
             one(&analysed, stdout)?;
         } else {
             // Only what is compared is kept.
-            all.push(analysed.sequence);
+            all.push((file_name(path), analysed.sequence));
         }
     }
     match (args.csv, all.is_empty()) {
         (_, true) => {}
-        (true, _) => csv(&all, stdout)?,
+        (true, _) => csv(all.iter().map(|(_, found)| found), stdout)?,
         (false, _) => comparison(&all, stdout)?,
     }
     Ok(Outcome::Done)
@@ -128,7 +130,8 @@ fn one(analysed: &Analysed, out: &mut dyn Write) -> anyhow::Result<()> {
     line("lines", kind(&found.lines))?;
     if let Some(motion) = &found.motion {
         let turned = motion.total_rotation_rad.to_degrees();
-        line("path", format!("{:.2} m, turned by {turned:.0}° in all", motion.path_length_m))?;
+        let grade = motion.grade.map(|grade| format!("; {} rotation", grade.name())).unwrap_or_default();
+        line("path", format!("{:.2} m, turned by {turned:.0}° in all{grade}", motion.path_length_m))?;
     }
     let noise = &found.noise;
     let noises: Vec<String> = [
@@ -239,7 +242,12 @@ fn rows(found: &SequenceStatistics) -> Vec<(String, &'static str, f64, Option<Di
     ]
 }
 
-fn comparison(all: &[SequenceStatistics], out: &mut dyn Write) -> anyhow::Result<()> {
+/// The name of a sequence's file or folder, which tells apart what was made of one sequence.
+fn file_name(path: &Path) -> String {
+    path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
+}
+
+fn comparison(all: &[(String, SequenceStatistics)], out: &mut dyn Write) -> anyhow::Result<()> {
     let header = [
         "SEQUENCE",
         "FRAMES",
@@ -254,16 +262,18 @@ fn comparison(all: &[SequenceStatistics], out: &mut dyn Write) -> anyhow::Result
         "STEP °",
         "STEP m",
         "PATH m",
+        "ROTATION",
     ];
     let mut table = text::table(header, &[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]);
     let degrees = 1.0_f64.to_degrees();
     let median = |found: Option<Distribution>, scale: f64| {
         found.map_or_else(|| "-".to_owned(), |found| short(found.median * scale))
     };
-    for found in all {
+    for (name, found) in all {
         let motion = found.motion.as_ref();
+        let grade = motion.and_then(|motion| motion.grade);
         table.add_row([
-            found.name.clone(),
+            name.clone(),
             text::count(found.frame_count),
             median(found.points.per_frame, 1.0),
             median(found.lines.per_frame, 1.0),
@@ -276,6 +286,7 @@ fn comparison(all: &[SequenceStatistics], out: &mut dyn Write) -> anyhow::Result
             median(motion.map(|motion| motion.rotation_rad), degrees),
             median(motion.map(|motion| motion.translation_m), 1.0),
             motion.map_or_else(|| "-".to_owned(), |motion| short(motion.path_length_m)),
+            grade.map_or("-", MotionGrade::name).to_owned(),
         ]);
     }
     writeln!(out, "{}", text::lines(&table))?;
@@ -339,7 +350,7 @@ fn frames_csv(analysed: &Analysed, header: bool, out: &mut dyn Write) -> anyhow:
 }
 
 /// A line for each sequence, a column for each number of the JSON, by its path.
-fn csv(all: &[SequenceStatistics], out: &mut dyn Write) -> anyhow::Result<()> {
+fn csv<'a>(all: impl Iterator<Item = &'a SequenceStatistics>, out: &mut dyn Write) -> anyhow::Result<()> {
     let mut rows: Vec<BTreeMap<String, String>> = Vec::new();
     for found in all {
         let mut row = BTreeMap::new();

@@ -244,8 +244,7 @@ fn words(svg: &mut Svg, scene: &Scene<'_>, colours: &[(GroupId, &'static str, us
         shown.map(|(group, colour, size)| (*colour, format!("group {}: {size}", group.0))).collect();
     entries.push((QUIET, "in no group".to_owned()));
     if colours.len() > COLOURS.len() {
-        entries
-            .push((PAPER, format!("and {} groups more", colours.len() - COLOURS.len())));
+        entries.push((PAPER, format!("and {} groups more", colours.len() - COLOURS.len())));
     }
     let mut left = MARGIN;
     for (colour, words) in &entries {

@@ -7,7 +7,8 @@ use super::sequence_statistics::{FeatureStatistics, MotionStatistics, NoiseStati
 use super::widest_parallax::WidestParallax;
 use crate::structure::{
     FrameBundle, FrameCounter, FrameStatistics, ImageCells, LineMeasurement, LineObservation, Manifest,
-    PointMeasurement, PointObservation, Record, Sequence, StructuralGroup, ray, shared,
+    PointMeasurement, PointObservation, Record, Sequence, StructuralGroup, grade_of, ray, shared,
+    typical_rotation,
 };
 
 /// Which rows are counted: measurements, or observations where a sequence has no measurement of the kind.
@@ -272,6 +273,7 @@ fn motion(frames: &[FrameStatistics], stamps: &[i64]) -> Option<MotionStatistics
             Some((frame.translation_since_previous?, frame.rotation_since_previous?, seconds))
         })
         .collect();
+    let typical = typical_rotation(steps.iter().map(|step| step.1));
     let timed = steps.iter().filter(|(_, _, seconds)| *seconds > 0.0);
     Some(MotionStatistics {
         steps: steps.len() as u64,
@@ -279,6 +281,8 @@ fn motion(frames: &[FrameStatistics], stamps: &[i64]) -> Option<MotionStatistics
         total_rotation_rad: steps.iter().map(|step| step.1).sum(),
         translation_m: Distribution::new(steps.iter().map(|step| step.0))?,
         rotation_rad: Distribution::new(steps.iter().map(|step| step.1))?,
+        typical_rotation_rad: typical,
+        grade: typical.map(grade_of),
         speed_m_per_s: Distribution::new(timed.clone().map(|(metres, _, seconds)| metres / seconds)),
         turn_rate_rad_per_s: Distribution::new(timed.map(|(_, angle, seconds)| angle / seconds)),
     })

@@ -1,5 +1,6 @@
 //! The statistics of a whole sequence, as they are given out.
 
+use crate::structure::MotionGrade;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -86,6 +87,13 @@ pub struct MotionStatistics {
     pub translation_m: Distribution,
     /// Angle from one frame to the next, radians.
     pub rotation_rad: Distribution,
+    /// Median angle from one frame to the next over the steps that turn by 0.01 degrees or more, radians; left out
+    /// where none does.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub typical_rotation_rad: Option<f64>,
+    /// Grade of the typical rotation: slow under 1 degree, medium under 5, else sharp.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub grade: Option<MotionGrade>,
     /// Speed, metres a second; left out where no time passes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub speed_m_per_s: Option<Distribution>,

@@ -233,3 +233,52 @@ fn the_eyes_of_this_test_see() {
     let lines: Vec<_> = code("// use crate::cli;\n\nlet a = 1; // crate::cli::x\n").collect();
     assert_eq!(lines, [(3, "let a = 1;")]);
 }
+
+/// Functions whose last bit depends on the platform; `libm` has each of them, the same everywhere.
+const PLATFORM_MATHS: &[&str] = &[
+    ".sin()",
+    ".cos()",
+    ".tan()",
+    ".sin_cos()",
+    ".asin()",
+    ".acos()",
+    ".atan()",
+    ".atan2(",
+    ".sinh()",
+    ".cosh()",
+    ".exp()",
+    ".exp2()",
+    ".ln()",
+    ".log10()",
+    ".log2()",
+    ".powf(",
+    ".hypot(",
+    ".cbrt()",
+    "from_axis_angle",
+    "from_euler_angles",
+    "from_scaled_axis",
+    "slerp(",
+    ".angle_to(&",
+    "rotation_between",
+];
+
+#[test]
+fn what_is_written_is_computed_the_same_on_every_machine() {
+    let mut wrong = Vec::new();
+    for folder in ["src/geometry", "src/structure", "src/simulate", "src/statistics"] {
+        for (path, text) in files(folder) {
+            if path.contains("/tests") || path.ends_with("strategies.rs") {
+                continue;
+            }
+            let text = text.split("#[cfg(test)]\nmod tests {").next().unwrap();
+            for (number, line) in code(text) {
+                for name in PLATFORM_MATHS {
+                    if line.contains(name) && !line.contains("libm::") {
+                        wrong.push(format!("{path}:{number}: {name}"));
+                    }
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "libm instead of:\n{}", wrong.join("\n"));
+}

@@ -18,6 +18,7 @@ use crate::simulate::{self, Expected, MAX_RECIPE_BYTES, Recipe, Simulation};
 /// name. The same recipe and seed give the same bytes on any machine. A recipe in JSON, as a simulated
 /// sequence carries it in its manifest, is read as well.
 #[derive(clap::Args, Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command")]
 #[command(after_help = "Examples:
   os simulate box1 -o box1.mcap
   os simulate corridor1 -o corridor1-again --seed 7
@@ -144,7 +145,7 @@ fn recipe_of(name: &str) -> anyhow::Result<(Recipe, PathBuf)> {
     let file = File::open(path).with_context(|| name.to_owned())?;
     let bytes = file.take(MAX_RECIPE_BYTES + 1).read_to_string(&mut text).with_context(|| name.to_owned())?;
     if bytes as u64 > MAX_RECIPE_BYTES {
-        anyhow::bail!("{name}: expected a recipe of at most {} bytes", MAX_RECIPE_BYTES);
+        anyhow::bail!("{name}: expected a recipe of at most {MAX_RECIPE_BYTES} bytes");
     }
     let recipe = if path.extension().is_some_and(|extension| extension == "json") {
         let recipe: Recipe = serde_json::from_str(&text).with_context(|| name.to_owned())?;

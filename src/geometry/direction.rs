@@ -33,6 +33,7 @@ pub(super) fn perpendicular(direction: Vector3<f64>) -> Vector3<f64> {
 }
 
 /// The angle between two directions of any length, radians in `[0, π]`.
+#[must_use]
 pub fn angle(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
     libm::atan2(a.cross(b).norm(), a.dot(b))
 }

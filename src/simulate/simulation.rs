@@ -135,6 +135,9 @@ impl Wanted {
     }
 }
 
+/// Landmarks, and for each frame what it sees of them.
+type Filled<T, S> = (Vec<T>, Vec<Box<[S]>>);
+
 /// Draws landmarks until enough of them are seen.
 struct Filling<'a> {
     what: &'static str,
@@ -156,7 +159,7 @@ impl Filling<'_> {
         see: impl Fn(&[T], &(dyn Fn() + Sync)) -> Vec<Vec<S>>,
         place_of: impl Fn(&S) -> u32,
         moved: impl Fn(S, u32) -> S,
-    ) -> Result<(Vec<T>, Vec<Box<[S]>>), Error> {
+    ) -> Result<Filled<T, S>, Error> {
         let mut kept: Vec<T> = Vec::new();
         let mut seen: Vec<Vec<S>> = Vec::new();
         seen.resize_with(self.frames, Vec::new);

@@ -291,3 +291,87 @@ impl Families {
         family
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::scene::Object;
+    use proptest::prelude::*;
+    use std::path::Path;
+
+    fn scene() -> Scene {
+        let objects = [
+            "kind = 'box'\nsize_m = [1.0, 2.0, 3.0]\nroll_pitch_yaw_deg = [10, 20, 30]",
+            "kind = 'room'\nsize_m = [8.0, 6.0, 4.0]",
+            "kind = 'staircase'\nsteps = 4\nposition_m = [1, 1, -2]",
+            "kind = 'ring-corridor'\nposition_m = [0, 0, 9]",
+        ];
+        let objects = objects.map(|text| toml::from_str::<Object>(text).unwrap());
+        Scene::build(&objects, Path::new("")).unwrap()
+    }
+
+    /// Metres; coordinates reach 12 m, directions of one family agree to 1e-7.
+    const ON_SURFACE_M: f64 = 1e-6;
+
+    fn lies_on(face: &Face, point: &Point3<f64>) -> bool {
+        let (normal, corners) = (face.normal().unwrap(), face.corners());
+        let inside = (0..corners.len()).all(|index| {
+            let side = corners[(index + 1) % corners.len()] - corners[index];
+            normal.cross(&side.normalize()).dot(&(point - corners[index])) > -ON_SURFACE_M
+        });
+        normal.dot(&(point - corners[0])).abs() < ON_SURFACE_M && inside
+    }
+
+    #[test]
+    fn points_fall_on_faces_in_proportion_to_their_areas() {
+        let scene = scene();
+        let source = PointSource::new(&scene, 11);
+        let count = 20_000_u32;
+        let points: Vec<_> = (0..u64::from(count)).map(|index| source.point(index)).collect();
+        for face in &scene.faces {
+            let share = face.area() / scene.area();
+            // Of the points in a half of the face, too; no two faces of the scene lie in each other.
+            let found = points.iter().filter(|point| lies_on(face, point)).count() as f64 / f64::from(count);
+            let sigma = (share * (1.0 - share) / f64::from(count)).sqrt();
+            assert!((found - share).abs() < 5.0 * sigma + 1e-9, "{found} {share}");
+        }
+        // Uniform in the largest face: the mean of points of a floor is its middle.
+        let floor = &scene
+            .faces
+            .iter()
+            .filter(|face| face.object == 1)
+            .max_by(|a, b| a.area().total_cmp(&b.area()))
+            .unwrap();
+        let on: Vec<_> = points.iter().filter(|point| lies_on(floor, point)).collect();
+        let mean = on.iter().fold(Vector3::zeros(), |sum, point| sum + point.coords) / on.len() as f64;
+        let middle = floor.corners().iter().fold(Vector3::zeros(), |sum, corner| sum + corner.coords) / 4.0;
+        // Half of 8 m over the square root of 3, for the longer side.
+        assert!((mean - middle).norm() < 5.0 * 2.0 * 4.0 / 3.0_f64.sqrt() / (on.len() as f64).sqrt());
+    }
+
+    proptest! {
+        #[test]
+        fn lines_lie_on_edges_or_faces_and_families_are_exactly_parallel(
+            seed in any::<u64>(), on_edges in 0.0..1.0_f64, oblique in 0.0..0.5_f64, free in 0.0..0.5_f64,
+        ) {
+            let scene = scene();
+            let recipe = LinesRecipe {
+                on_edges, oblique, free, min_length_m: 0.1, max_length_m: 2.5, oblique_directions: 2,
+                ..LinesRecipe::default()
+            };
+            let source = LineSource::new(&scene, &recipe, seed);
+            let mut families: std::collections::BTreeMap<u32, Vector3<f64>> = Default::default();
+            for index in 0..40 {
+                let DrawnLine { segment: Segment { start, end }, family } = source.line(index).unwrap();
+                let along = end - start;
+                prop_assert!((0.1 - 1e-9..2.5 + 1e-9).contains(&along.norm()));
+                prop_assert!(scene.faces.iter().any(|face| lies_on(face, &start) && lies_on(face, &end)));
+                if let Some(family) = family {
+                    let first = families.entry(family).or_insert(along);
+                    // Radians: rounding of two ends 12 m away over 0.1 m.
+                    prop_assert!(first.cross(&along).norm() / first.norm() / along.norm() < 1e-12);
+                }
+            }
+        }
+    }
+}

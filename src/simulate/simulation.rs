@@ -1,11 +1,14 @@
 //! From a recipe to a sequence.
 
 use std::collections::HashMap;
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use nalgebra::Point3;
 use rayon::prelude::*;
+use sha2::{Digest, Sha256};
 
 use super::landmarks::{DrawnLine, LineSource, PointSource};
 use super::scene::Scene;
@@ -15,7 +18,8 @@ use super::{Density, Error, Recipe};
 use crate::geometry::Segment;
 use crate::structure::{
     Camera, Clock, Frame, FrameBundle, FrameId, Generator, GroupId, LineId, LineLandmark, LineObservation,
-    Manifest, PointId, PointLandmark, PointObservation, PoseRow, Source, StructuralGroup, registry,
+    Manifest, PointId, PointLandmark, PointObservation, PoseRow, Source, SourceFile, StructuralGroup, hex,
+    registry,
 };
 
 /// Landmarks that are drawn to learn how many a frame sees.
@@ -35,6 +39,7 @@ const SAME_LINE_M: f64 = 0.01;
 pub struct Simulation {
     recipe: Recipe,
     camera: Camera,
+    files: Vec<SourceFile>,
     scene: Scene,
     frames: Vec<Frame>,
     views: Vec<View>,
@@ -62,6 +67,7 @@ pub fn simulate(
     let seed = recipe.seed;
     let pinhole = recipe.camera.pinhole("camera")?;
     let camera = recipe.camera.camera("camera")?;
+    let files = recipe.files().into_iter().map(|name| source_file(name, folder)).collect::<Result<_, _>>()?;
     let scene = Scene::build(&recipe.scene, folder)?;
     let poses = recipe.trajectory.poses(recipe.rate_hz, seed, folder)?;
     let bounds = recipe.visibility.bounds();
@@ -108,6 +114,7 @@ pub fn simulate(
     Ok(Simulation {
         recipe: recipe.clone(),
         camera,
+        files,
         frames,
         points,
         groups: groups(&drawn),
@@ -117,6 +124,29 @@ pub fn simulate(
         views: survey.views,
         scene,
     })
+}
+
+/// A file that the recipe names, with its size and digest.
+fn source_file(name: &Path, folder: &Path) -> Result<SourceFile, Error> {
+    let path = folder.join(name);
+    let io = |source| Error::Io { path: path.clone(), source };
+    if !path.metadata().map_err(io)?.is_file() {
+        let found = "a folder or a device".to_owned();
+        return Err(Error::Content { path, line: None, expected: "a file".to_owned(), found });
+    }
+    let mut file = File::open(&path).map_err(io)?;
+    let mut hasher = Sha256::new();
+    let mut bytes = 0;
+    let mut buffer = vec![0; 1 << 16];
+    loop {
+        let read = file.read(&mut buffer).map_err(io)?;
+        if read == 0 {
+            break;
+        }
+        hasher.update(&buffer[..read]);
+        bytes += read as u64;
+    }
+    Ok(SourceFile { name: name.display().to_string(), bytes, sha256: hex(&hasher.finalize()) })
 }
 
 /// How many landmarks are wanted.
@@ -353,6 +383,7 @@ impl Simulation {
                 sequence: Some(recipe.name.clone()),
                 licence: Some(recipe.licence.clone()),
                 citation: recipe.citation.clone(),
+                files: self.files.clone(),
                 ..Source::default()
             },
             generator: Generator {

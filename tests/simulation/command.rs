@@ -92,3 +92,20 @@ fn the_recipes_are_listed() {
         assert!(listed.lines().any(|line| line.starts_with(name)), "{listed}");
     }
 }
+
+proptest::proptest! {
+    #[test]
+    fn a_damaged_recipe_is_a_recipe_or_an_error(
+        edits in proptest::collection::vec((0..SMALL.len(), proptest::char::any()), 1..6),
+    ) {
+        let mut characters: Vec<char> = SMALL.chars().collect();
+        for (place, character) in edits {
+            let last = characters.len() - 1;
+            characters[place.min(last)] = character;
+        }
+        let text: String = characters.into_iter().collect();
+        if let Ok(recipe) = open_structure::simulate::Recipe::from_toml(&text) {
+            let _ = open_structure::simulate::scene::Scene::build(&recipe.scene, "".as_ref());
+        }
+    }
+}

@@ -30,6 +30,8 @@ fn landmarks_lie_on_the_mesh_and_its_back_is_hidden() {
     done(&["simulate", text(&recipe), "-o", text(&output)]);
     done(&["validate", "--deny", "warnings", text(&output)]);
     let sequence = format::read(&output).unwrap();
+    let files = &sequence.manifest.source.files;
+    assert!(files.len() == 1 && files[0].name == "models/cube.ply" && files[0].bytes == CUBE.len() as u64);
     for point in &sequence.point_landmarks {
         let coordinates = [point.x, point.y, point.z].map(f64::abs);
         let largest = coordinates.into_iter().fold(0.0, f64::max);

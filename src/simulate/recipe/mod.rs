@@ -5,6 +5,8 @@ mod expected;
 mod landmarks;
 mod library;
 
+use std::path::Path;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -96,6 +98,23 @@ impl Recipe {
         })?;
         recipe.check()?;
         Ok(recipe)
+    }
+
+    /// Files that the recipe names, by the names that it has for them.
+    #[must_use]
+    pub fn files(&self) -> Vec<&Path> {
+        let meshes = self.scene.iter().filter_map(|object| match object {
+            Object::Mesh(mesh) => Some(mesh.file.as_path()),
+            _ => None,
+        });
+        let path = match &self.trajectory {
+            Trajectory::File(file) => Some(file.file.as_path()),
+            _ => None,
+        };
+        let mut files: Vec<&Path> = meshes.chain(path).collect();
+        files.sort_unstable();
+        files.dedup();
+        files
     }
 
     /// The JSON Schema (2020-12) of a recipe; TOML has the same shape.

@@ -23,7 +23,7 @@ use crate::structure::{
 #[serde(deny_unknown_fields)]
 pub struct File {
     /// The file; a relative name begins at the recipe's folder.
-    pub path: PathBuf,
+    pub file: PathBuf,
     /// Its format; guessed from the content if not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub format: Option<TrajectoryFormat>,
@@ -40,7 +40,7 @@ impl File {
     pub(super) fn poses(&self, rate_hz: f64, folder: &FilePath) -> Result<Vec<TimedPose>, Error> {
         let world_from_file = transform("trajectory.world_from_file", self.world_from_file)?;
         let body_from_camera = transform("trajectory.body_from_camera", self.body_from_camera)?;
-        let path = folder.join(&self.path);
+        let path = folder.join(&self.file);
         self.rows(&path)?
             .into_iter()
             .enumerate()

@@ -11,7 +11,7 @@ const KINDS: [&str; 7] = [
     "kind = 'figure-eight'\nframes = 60",
     "kind = 'random'\nframes = 60",
     "kind = 'waypoints'\nframes = 60\nwaypoints = [{position_m = [0, 0, 0]}, {position_m = [1, 0, 0]}, {position_m = [1, 2, 0.5]}]",
-    "kind = 'file'\npath = 'poses.txt'",
+    "kind = 'file'\nfile = 'poses.txt'",
 ];
 
 fn json(text: &str) -> serde_json::Value {
@@ -63,8 +63,8 @@ fn a_file_gives_its_poses_and_its_stamps() {
     std::fs::write(folder.path().join("tum.txt"), "# stamp\n5.5 1 2 3 0 0 0 1\r\n5.7 4 5 6 1 0 0 0").unwrap();
     std::fs::write(folder.path().join("kitti.txt"), "1 0 0 1 0 1 0 2 0 0 1 3\n1 0 0 4 0 -1 0 5 0 0 -1 6\n")
         .unwrap();
-    let tum = poses("kind = 'file'\npath = 'tum.txt'").unwrap();
-    let kitti = poses("kind = 'file'\npath = 'kitti.txt'\nformat = 'kitti'").unwrap();
+    let tum = poses("kind = 'file'\nfile = 'tum.txt'").unwrap();
+    let kitti = poses("kind = 'file'\nfile = 'kitti.txt'\nformat = 'kitti'").unwrap();
     assert_eq!(tum.iter().map(|pose| pose.stamp_nanos).collect::<Vec<_>>(), [5_500_000_000, 5_700_000_000]);
     assert_eq!(kitti.iter().map(|pose| pose.stamp_nanos).collect::<Vec<_>>(), [0, 100_000_000]);
     let file = |pose: &TimedPose| pose.world_from_camera.components();
@@ -72,26 +72,26 @@ fn a_file_gives_its_poses_and_its_stamps() {
     assert_eq!(kitti.iter().map(file).collect::<Vec<_>>(), tum.iter().map(file).collect::<Vec<_>>());
     // The file's world half a turn about z; the camera 1 m along the body's x axis.
     let placed = poses(
-        "kind = 'file'\npath = 'tum.txt'\nworld_from_file = [0, 0, 9, 0, 0, 1, 0]\nbody_from_camera = [1, 0, 0, 0, 0, 0, 1]",
+        "kind = 'file'\nfile = 'tum.txt'\nworld_from_file = [0, 0, 9, 0, 0, 1, 0]\nbody_from_camera = [1, 0, 0, 0, 0, 0, 1]",
     );
     assert_eq!(placed.unwrap()[0].world_from_camera.translation(), nalgebra::Vector3::new(-2.0, -2.0, 12.0));
     let refused = |recipe: &str| poses(recipe).unwrap_err();
     std::fs::write(folder.path().join("bad.txt"), "0 1 2 3 0 0 0 1\n1 1 2 3 0 0 0\n").unwrap();
-    let error = refused("kind = 'file'\npath = 'bad.txt'");
+    let error = refused("kind = 'file'\nfile = 'bad.txt'");
     assert!(
         matches!(&error, Error::Content { path, line: Some(2), .. } if path.ends_with("bad.txt")),
         "{error}"
     );
-    assert!(matches!(refused("kind = 'file'\npath = 'none.txt'"), Error::Io { .. }));
-    assert!(matches!(refused("kind = 'file'\npath = '.'"), Error::Content { line: None, .. }));
-    let error = refused("kind = 'file'\npath = 'tum.txt'\nworld_from_file = [0, 0, 9, 0, 0, 0, 0]");
+    assert!(matches!(refused("kind = 'file'\nfile = 'none.txt'"), Error::Io { .. }));
+    assert!(matches!(refused("kind = 'file'\nfile = '.'"), Error::Content { line: None, .. }));
+    let error = refused("kind = 'file'\nfile = 'tum.txt'\nworld_from_file = [0, 0, 9, 0, 0, 0, 0]");
     assert!(
         matches!(&error, Error::Geometry { place, .. } if place == "trajectory.world_from_file"),
         "{error}"
     );
     let large = std::fs::File::create(folder.path().join("large.txt")).unwrap();
     large.set_len(crate::structure::LARGEST_TRAJECTORY_FILE_BYTES + 1).unwrap();
-    assert!(refused("kind = 'file'\npath = 'large.txt'").to_string().contains("at most 536870912 bytes"));
+    assert!(refused("kind = 'file'\nfile = 'large.txt'").to_string().contains("at most 536870912 bytes"));
 }
 
 #[test]

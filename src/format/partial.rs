@@ -23,7 +23,7 @@ pub fn discard_unfinished() {
 ///
 /// The temporary name lies beside the final one, so that renaming is atomic: `.NAME.<pid>.partial`.
 #[derive(Debug)]
-pub(super) struct Partial {
+pub(crate) struct Partial {
     target: PathBuf,
     temporary: PathBuf,
     finished: bool,
@@ -32,7 +32,7 @@ pub(super) struct Partial {
 
 impl Partial {
     /// Reserves the place; refuses when something stands there and `force` is not given.
-    pub(super) fn new(target: &Path, force: bool) -> Result<Self, Error> {
+    pub(crate) fn new(target: &Path, force: bool) -> Result<Self, Error> {
         if !force && target.symlink_metadata().is_ok() {
             return Err(Error::Exists { path: target.to_owned() });
         }
@@ -49,7 +49,7 @@ impl Partial {
     }
 
     /// The temporary name.
-    pub(super) fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         &self.temporary
     }
 
@@ -59,13 +59,13 @@ impl Partial {
     }
 
     /// Makes the temporary folder, empty.
-    pub(super) fn create_folder(&self) -> Result<(), Error> {
+    pub(crate) fn create_folder(&self) -> Result<(), Error> {
         remove(&self.temporary).map_err(Error::io(&self.temporary))?;
         fs::create_dir(&self.temporary).map_err(Error::io(&self.temporary))
     }
 
     /// Gives the output its final name; what stood there before goes only now.
-    pub(super) fn finish(mut self) -> Result<(), Error> {
+    pub(crate) fn finish(mut self) -> Result<(), Error> {
         let failed = Error::io(&self.target);
         if self.target.symlink_metadata().is_ok() {
             if !self.force {

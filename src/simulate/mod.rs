@@ -9,6 +9,7 @@ mod landmarks;
 pub mod noise;
 mod random;
 mod recipe;
+pub mod render;
 pub mod scene;
 mod simulation;
 mod survey;
@@ -18,8 +19,8 @@ pub mod visibility;
 pub use error::Error;
 pub use random::Random;
 pub use recipe::{
-    CameraPreset, CameraRecipe, Density, Expected, LinesRecipe, MAX_RECIPE_BYTES, PointsRecipe, Recipe, named,
-    names,
+    CameraPreset, CameraRecipe, Density, Expected, LinesRecipe, MAX_RECIPE_BYTES, PointsRecipe, Recipe,
+    named, names,
 };
 pub use simulation::{Simulation, simulate};
 pub use survey::{SeenLine, Survey};

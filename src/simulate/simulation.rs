@@ -198,14 +198,20 @@ impl Filling<'_> {
             }
             let missing = target - (kept.len() as u64).min(target);
             if missing > 0 && drawn > MOST_DRAWS * target + 1000 {
-                let expected =
-                    format!("a number of {} of which each is seen in {} frames", self.what, self.min_observations);
+                let expected = format!(
+                    "a number of {} of which each is seen in {} frames",
+                    self.what, self.min_observations
+                );
                 let found = format!("{target}, but of {drawn} drawn only {} are", kept.len());
                 return Err(Error::value(self.what, expected, found));
             }
             // As many as should do, by what was seen so far, and some more.
             let rate = (kept.len() as f64 / drawn as f64).max(0.02);
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "counts of landmarks")]
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "counts of landmarks"
+            )]
             let next = (missing as f64 / rate * 1.1) as u64 + 16;
             batch = if missing == 0 { 0 } else { next };
         }
@@ -219,7 +225,11 @@ impl Filling<'_> {
         let median = per_view.get(per_view.len() / 2).copied().unwrap_or(0).max(1);
         let usable = counts.iter().filter(|count| **count >= self.min_observations).count();
         if usable == 0 {
-            return Err(Error::value(self.what, "landmarks that frames see", format!("none of {} drawn", counts.len())));
+            return Err(Error::value(
+                self.what,
+                "landmarks that frames see",
+                format!("none of {} drawn", counts.len()),
+            ));
         }
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "counts of landmarks")]
         let target = (per_frame * usable as f64 / median as f64).ceil() as u64;
@@ -388,9 +398,13 @@ impl Simulation {
             })
             .collect();
         let (point_measurements, line_measurements) = match &self.recipe.noise {
-            Some(noise) => {
-                noise.measure(&self.camera, frame_id, &point_observations, &line_observations, self.recipe.seed)
-            }
+            Some(noise) => noise.measure(
+                &self.camera,
+                frame_id,
+                &point_observations,
+                &line_observations,
+                self.recipe.seed,
+            ),
             None => (Vec::new(), Vec::new()),
         };
         Some(FrameBundle {

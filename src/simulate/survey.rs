@@ -3,7 +3,9 @@
 use nalgebra::Point3;
 use rayon::prelude::*;
 
-use super::visibility::{Occluders, PointIndex, View, Visibility, VisibilityModel, sampled_part, visible_part};
+use super::visibility::{
+    Occluders, PointIndex, View, Visibility, VisibilityModel, sampled_part, visible_part,
+};
 use crate::geometry::Segment;
 
 /// A line that a frame sees, and the part of it.

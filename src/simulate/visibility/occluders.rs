@@ -157,8 +157,9 @@ impl Occluders {
         self.search(
             |low, high| slabs.meet(low, high, 1.0),
             |triangle| {
-                hidden = triangle.meet(eye, &direction).is_some_and(|along| along > 0.0 && along < 1.0 - BEHIND)
-                    && !triangle.holds(point);
+                hidden =
+                    triangle.meet(eye, &direction).is_some_and(|along| along > 0.0 && along < 1.0 - BEHIND)
+                        && !triangle.holds(point);
                 hidden
             },
         );
@@ -268,7 +269,13 @@ impl Fan {
         Some(Self { eye: *eye, normal: cross / squared.sqrt(), duals })
     }
 
-    fn may_meet(&self, low: &Point3<f64>, high: &Point3<f64>, fan_low: &Point3<f64>, fan_high: &Point3<f64>) -> bool {
+    fn may_meet(
+        &self,
+        low: &Point3<f64>,
+        high: &Point3<f64>,
+        fan_low: &Point3<f64>,
+        fan_high: &Point3<f64>,
+    ) -> bool {
         let apart = (0..3).any(|axis| low[axis] > fan_high[axis] || high[axis] < fan_low[axis]);
         if apart {
             return false;
@@ -291,12 +298,15 @@ impl Fan {
             }
             if heights[corner] * heights[next] < 0.0 {
                 let part = heights[corner] / (heights[corner] - heights[next]);
-                cut.push([0, 1].map(|axis| flat[corner][axis] + part * (flat[next][axis] - flat[corner][axis])));
+                cut.push(
+                    [0, 1].map(|axis| flat[corner][axis] + part * (flat[next][axis] - flat[corner][axis])),
+                );
             }
         }
         let (first, last) = (*cut.first()?, *cut.last()?);
         // What hides lies in front: α, β ≥ 0 and α + β < 1. Clipped like any segment.
-        let conditions = |[alpha, beta]: [f64; 2]| [alpha, beta, 1.0 - BEHIND - alpha - beta, alpha + beta - 1e-12];
+        let conditions =
+            |[alpha, beta]: [f64; 2]| [alpha, beta, 1.0 - BEHIND - alpha - beta, alpha + beta - 1e-12];
         let (from, to) = (conditions(first), conditions(last));
         let (mut low, mut high) = (0.0_f64, 1.0_f64);
         for (at_first, at_last) in from.into_iter().zip(to) {
@@ -374,12 +384,16 @@ mod tests {
     #[test]
     fn a_face_does_not_hide_what_lies_on_it() {
         let corner = |x, y| Point3::new(x, y, 2.0);
-        let wall = Face::quad([corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)], 0);
+        let wall =
+            Face::quad([corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)], 0);
         let occluders = Occluders::new(&Scene { faces: vec![wall], edges: Vec::new() });
         let eye = Point3::origin();
         assert!(!occluders.hides(&eye, &corner(0.3, 0.4)));
         assert!(occluders.hides(&eye, &Point3::new(0.3, 0.4, 2.001)));
-        assert_eq!(occluders.hidden_parts(&eye, &corner(-1.0, 0.2), &corner(1.0, 0.2)), Vec::<[f64; 2]>::new());
+        assert_eq!(
+            occluders.hidden_parts(&eye, &corner(-1.0, 0.2), &corner(1.0, 0.2)),
+            Vec::<[f64; 2]>::new()
+        );
         // Twice as far away, the wall covers from −2 to 2 of a segment from −4 to 4.
         let parts = occluders.hidden_parts(&eye, &Point3::new(-4.0, 0.1, 4.0), &Point3::new(4.0, 0.1, 4.0));
         assert!(parts.len() == 1 && (parts[0][0] - 0.25).abs() < 1e-8 && (parts[0][1] - 0.75).abs() < 1e-8);

@@ -30,7 +30,8 @@ impl PointIndex {
     #[must_use]
     pub fn new(points: &[Point3<f64>]) -> Self {
         let Some(first) = points.first() else { return Self::default() };
-        let (low, high) = points.iter().fold((*first, *first), |(low, high), point| (low.inf(point), high.sup(point)));
+        let (low, high) =
+            points.iter().fold((*first, *first), |(low, high), point| (low.inf(point), high.sup(point)));
         let extent = high - low;
         // On surfaces the number of cells that hold anything grows with the square of their number along a side.
         let sides = (points.len() as f64 / POINTS_PER_CELL).sqrt().clamp(1.0, 256.0);
@@ -90,10 +91,11 @@ impl PointIndex {
         for block in &self.blocks {
             let Some(inside) = view.classify(&block.low, &block.high) else { continue };
             for cell in &self.cells[block.begin..block.end] {
-                let inside = inside || match view.classify(&cell.low, &cell.high) {
-                    Some(inside) => inside,
-                    None => continue,
-                };
+                let inside = inside
+                    || match view.classify(&cell.low, &cell.high) {
+                        Some(inside) => inside,
+                        None => continue,
+                    };
                 for index in cell.begin..cell.end {
                     let point = &self.points[index];
                     if (inside || view.project(point).is_some()) && passes(point) {
@@ -115,9 +117,8 @@ fn clamp_to_u16(number: f64) -> u16 {
 
 /// Bits of three numbers, one of each in turn: near cells come near each other.
 fn interleave(cell: Vector3<u16>) -> u64 {
-    let spread = |number: u16| {
-        (0..16).fold(0_u64, |bits, bit| bits | (u64::from(number >> bit & 1) << (3 * bit)))
-    };
+    let spread =
+        |number: u16| (0..16).fold(0_u64, |bits, bit| bits | (u64::from(number >> bit & 1) << (3 * bit)));
     spread(cell.x) | spread(cell.y) << 1 | spread(cell.z) << 2
 }
 

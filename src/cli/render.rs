@@ -27,7 +27,7 @@ const MEMBERS: [&str; 10] = [
 ];
 
 #[derive(clap::Args, Debug)]
-pub(super) struct Args {
+pub(super) struct RawArgs {
     /// Also write a raw RGB-D dataset of the frames, in the layout and conventions of this one.
     #[arg(long, value_enum, value_name = "DATASET", requires = "render_to")]
     render: Option<Dataset>,
@@ -58,7 +58,7 @@ enum Dataset {
     Tartanair,
 }
 
-impl Args {
+impl RawArgs {
     /// The folder to render into, if there is to be one.
     ///
     /// # Errors

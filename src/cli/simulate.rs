@@ -47,7 +47,7 @@ pub(super) struct Args {
     #[arg(long)]
     list: bool,
     #[command(flatten, next_help_heading = "Raw RGB-D data")]
-    render: render::Args,
+    render: render::RawArgs,
 }
 
 pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome> {

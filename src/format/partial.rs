@@ -14,8 +14,9 @@ static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 /// Removes every unfinished output of this process: what a program does when it is interrupted.
 pub fn discard_unfinished() {
     for path in UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).iter() {
+        // Other threads go on writing: a file that appears in a folder while it is emptied keeps it from going.
         // Nothing more can be done about a temporary file that cannot be removed.
-        let _ = remove(path);
+        let _ = (0..100).find(|_| remove(path).is_ok());
     }
 }
 

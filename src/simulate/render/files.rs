@@ -4,8 +4,6 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-use npyz::WriterBuilder;
-
 use super::Shot;
 use crate::simulate::Error;
 
@@ -72,18 +70,27 @@ pub(super) fn depth_array(path: &Path, shot: &Shot, nowhere_m: f32) -> Result<()
     let file = File::create(path).map_err(failed(path))?;
     let mut output = BufWriter::new(file);
     let mut encoded = || -> io::Result<()> {
-        let mut writer = npyz::WriteOptions::new()
-            .dtype(npyz::DType::Plain("<f4".parse().map_err(io::Error::other)?))
-            .shape(&[shot.height.into(), shot.width.into()])
-            .writer(&mut output)
-            .begin_nd()?;
+        output.write_all(&array_header(shot.height, shot.width))?;
         for depth in &shot.depth_m {
             #[expect(clippy::cast_possible_truncation, reason = "the array has 32 bits")]
             let depth = *depth as f32;
-            writer.push(&if depth.is_finite() { depth } else { nowhere_m })?;
+            output.write_all(&if depth.is_finite() { depth } else { nowhere_m }.to_le_bytes())?;
         }
-        writer.finish()
+        output.flush()
     };
-    encoded().map_err(failed(path))?;
-    output.flush().map_err(failed(path))
+    encoded().map_err(failed(path))
+}
+
+/// What stands before the numbers, as NumPy writes it: filled with blanks to a multiple of 64 bytes.
+fn array_header(rows: u32, columns: u32) -> Vec<u8> {
+    let mut words = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({rows}, {columns}), }}");
+    // Magic, version and the length of what follows are ten bytes, the line's end is one.
+    let length = (words.len() + 11).next_multiple_of(64) - 10;
+    words.extend(std::iter::repeat_n(' ', length - 1 - words.len()));
+    words.push('\n');
+    let mut header = b"\x93NUMPY\x01\x00".to_vec();
+    #[expect(clippy::cast_possible_truncation, reason = "128 bytes for any size")]
+    header.extend((length as u16).to_le_bytes());
+    header.extend(words.into_bytes());
+    header
 }

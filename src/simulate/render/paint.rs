@@ -45,6 +45,8 @@ pub(super) struct Place {
     pub(super) size: Option<[f64; 2]>,
     /// Name of the face, or of the object whose faces are too small for names of their own.
     pub(super) key: i64,
+    /// Name of the object that has the face.
+    pub(super) object: i64,
     /// Upward part of the normal on the side that is seen.
     pub(super) up: f64,
     /// Size of a pixel here, in units of the paint.
@@ -136,7 +138,7 @@ impl<'a> Paint<'a> {
         pixel_m: f64,
     ) -> Place {
         let scale = 1.0 / self.unit_m;
-        let (up, pixel) = (normal.z, pixel_m * scale);
+        let (up, pixel, object) = (normal.z, pixel_m * scale, i64::from(face.object));
         if let [a, b, _, d] = face.corners()
             && let Some(along) = (b - a).try_normalize(0.0)
         {
@@ -151,13 +153,13 @@ impl<'a> Paint<'a> {
                 at.swap(0, 1);
                 size.swap(0, 1);
             }
-            return Place { at, size: Some(size), key: i64::from(index), up, pixel };
+            return Place { at, size: Some(size), key: i64::from(index), object, up, pixel };
         }
         // Triangles of a mesh share a pattern that is laid along the two axes that they face least.
         let facing = normal.map(f64::abs).imax();
         let axes = [[1, 2], [0, 2], [0, 1]][facing];
-        let key = (1 << 33) + i64::from(face.object) * 3 + [0, 1, 2][facing];
-        Place { at: axes.map(|axis| place[axis] * scale), size: None, key, up, pixel }
+        let key = (1 << 33) + object * 3 + [0, 1, 2][facing];
+        Place { at: axes.map(|axis| place[axis] * scale), size: None, key, object, up, pixel }
     }
 }
 

@@ -159,11 +159,11 @@ fn picture(lattice: &Lattice, place: &Place, [i, j]: [i64; 2], at: [f64; 2], ins
 
 /// Boards with doors or drawers and handles.
 fn furniture(lattice: &Lattice, place: &Place) -> Color {
-    let chance = lattice.uniform(&[place.key, 61]);
+    let chance = lattice.uniform(&[place.object, 61]);
     let base = if chance < 0.5 {
-        hue(lattice.uniform(&[place.key, 62]), 0.55, 0.8)
+        hue(lattice.uniform(&[place.object, 62]), 0.55, 0.8)
     } else {
-        let tone = 0.6 + 0.5 * lattice.uniform(&[place.key, 63]);
+        let tone = 0.6 + 0.5 * lattice.uniform(&[place.object, 63]);
         [0.72 * tone, 0.55 * tone, 0.4 * tone]
     };
     let Some([width, height]) = place.size else { return base };

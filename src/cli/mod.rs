@@ -12,6 +12,7 @@ mod man;
 mod measure;
 mod plot;
 mod progress;
+mod render;
 mod schema;
 mod simulate;
 mod stats;

@@ -8,7 +8,7 @@ use anyhow::Context;
 
 use super::progress::Progress;
 use super::two_pass::write_two_pass;
-use super::{Outcome, text};
+use super::{Outcome, render, text};
 use crate::format::{Encoding, WriteOptions};
 use crate::simulate::{self, Expected, MAX_RECIPE_BYTES, Recipe, Simulation};
 
@@ -23,6 +23,7 @@ use crate::simulate::{self, Expected, MAX_RECIPE_BYTES, Recipe, Simulation};
   os simulate box1 -o box1.mcap
   os simulate corridor1 -o corridor1-again --seed 7
   os simulate my-scene.toml -o my-scene
+  os simulate box1 -o box1.mcap --render tum --render-to box1-raw --render-frames 0..60
   os simulate --list")]
 pub(super) struct Args {
     /// Recipe: a file, or the name of one that travels with the program.
@@ -46,6 +47,8 @@ pub(super) struct Args {
     /// List the recipes that travel with the program.
     #[arg(long)]
     list: bool,
+    #[command(flatten, next_help_heading = "Raw RGB-D data")]
+    render: render::RawArgs,
 }
 
 pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome> {
@@ -59,6 +62,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         );
     }
     refuse_existing(output, args.force)?;
+    let raw = args.render.target(args.force)?;
     let (mut recipe, folder) = recipe_of(name)?;
     // What is expected, is expected of the recipe as it stands.
     let expected = recipe.expected.take().filter(|_| args.seed.is_none_or(|seed| seed == recipe.seed));
@@ -86,6 +90,16 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         text::count(rows),
         text::bytes(text::size_on_disk(output))
     )?;
+    if let Some(raw) = raw {
+        let rendered = args.render.render(&simulation, raw, args.force)?;
+        let (width, height) = (rendered.width, rendered.height);
+        let (frames, size) = (text::count(rendered.frames as u64), text::bytes(text::size_on_disk(raw)));
+        writeln!(
+            stdout,
+            "{}: {frames} pictures and depth maps of {width} x {height} px, {size}",
+            raw.display()
+        )?;
+    }
     if args.print_expected {
         writeln!(stdout, "\n[expected]\n{}", expected_table(&found))?;
     }

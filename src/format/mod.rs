@@ -42,6 +42,7 @@ pub use error::Error;
 pub use frames::Frames;
 pub use json_schema::json_schema;
 pub(crate) use mcap_survey::{Faults, McapSurvey, survey_file};
+pub(crate) use partial::Partial;
 pub use partial::discard_unfinished;
 pub use reader::{SequenceReader, open, read};
 pub use stored_table::StoredTable;

@@ -14,8 +14,9 @@ static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 /// Removes every unfinished output of this process: what a program does when it is interrupted.
 pub fn discard_unfinished() {
     for path in UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).iter() {
+        // Other threads go on writing: a file that appears in a folder while it is emptied keeps it from going.
         // Nothing more can be done about a temporary file that cannot be removed.
-        let _ = remove(path);
+        let _ = (0..100).find(|_| remove(path).is_ok());
     }
 }
 
@@ -23,7 +24,7 @@ pub fn discard_unfinished() {
 ///
 /// The temporary name lies beside the final one, so that renaming is atomic: `.NAME.<pid>.partial`.
 #[derive(Debug)]
-pub(super) struct Partial {
+pub(crate) struct Partial {
     target: PathBuf,
     temporary: PathBuf,
     finished: bool,
@@ -32,7 +33,7 @@ pub(super) struct Partial {
 
 impl Partial {
     /// Reserves the place; refuses when something stands there and `force` is not given.
-    pub(super) fn new(target: &Path, force: bool) -> Result<Self, Error> {
+    pub(crate) fn new(target: &Path, force: bool) -> Result<Self, Error> {
         if !force && target.symlink_metadata().is_ok() {
             return Err(Error::Exists { path: target.to_owned() });
         }
@@ -49,7 +50,7 @@ impl Partial {
     }
 
     /// The temporary name.
-    pub(super) fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         &self.temporary
     }
 
@@ -59,13 +60,13 @@ impl Partial {
     }
 
     /// Makes the temporary folder, empty.
-    pub(super) fn create_folder(&self) -> Result<(), Error> {
+    pub(crate) fn create_folder(&self) -> Result<(), Error> {
         remove(&self.temporary).map_err(Error::io(&self.temporary))?;
         fs::create_dir(&self.temporary).map_err(Error::io(&self.temporary))
     }
 
     /// Gives the output its final name; what stood there before goes only now.
-    pub(super) fn finish(mut self) -> Result<(), Error> {
+    pub(crate) fn finish(mut self) -> Result<(), Error> {
         let failed = Error::io(&self.target);
         if self.target.symlink_metadata().is_ok() {
             if !self.force {

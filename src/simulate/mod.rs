@@ -9,6 +9,7 @@ mod landmarks;
 pub mod noise;
 mod random;
 mod recipe;
+pub mod render;
 pub mod scene;
 mod simulation;
 mod survey;

@@ -1,15 +1,15 @@
 //! How fast it is found what frames see, how the work grows, and what memory it takes.
 
-use std::env;
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::Command;
-use std::time::Instant;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
 use nalgebra::Point3;
-use open_structure::geometry::PinholeCamera;
-use open_structure::simulate::scene::Scene;
+use open_structure::format;
+use open_structure::geometry::{PinholeCamera, Pose};
 use open_structure::simulate::visibility::{Occluders, View, Visibility, VisibilityModel};
 use open_structure::simulate::{self, Recipe, Survey};
 
@@ -43,7 +43,8 @@ pub(crate) fn measure(figures: &mut Figures) -> Result<()> {
     for (scene, frames) in [("corridor1", 1000), ("box1", 1000)] {
         against_numpy(figures, scene, frames)?;
     }
-    Ok(())
+    growth(figures)?;
+    memory(figures)
 }
 
 /// A recipe of the library with other numbers of frames and landmarks.
@@ -97,11 +98,7 @@ fn against_numpy(figures: &mut Figures, name: &str, frames: u64) -> Result<()> {
 }
 
 /// Seconds that NumPy takes, and how many points it sees, all frames together; `None` without NumPy.
-fn numpy(
-    points: &[Point3<f64>],
-    poses: &[open_structure::geometry::Pose],
-    camera: &PinholeCamera,
-) -> Result<Option<(f64, usize)>> {
+fn numpy(points: &[Point3<f64>], poses: &[Pose], camera: &PinholeCamera) -> Result<Option<(f64, usize)>> {
     let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR"))?;
     let points = points.iter().flat_map(|point| [point.x, point.y, point.z]);
     fs::write(folder.path().join("points"), points.flat_map(f64::to_ne_bytes).collect::<Vec<u8>>())?;
@@ -124,4 +121,128 @@ fn numpy(
     let text = String::from_utf8(output.stdout)?;
     let (seconds, seen) = text.trim().split_once(' ').context("no two numbers")?;
     Ok(Some((seconds.parse()?, seen.parse()?)))
+}
+
+/// What a run of `os simulate` took.
+struct Run {
+    seconds: f64,
+    /// Greatest resident memory, MiB.
+    peak_mib: f64,
+    /// Observations of points and lines.
+    observations: f64,
+}
+
+/// Runs `os simulate` and looks at its memory meanwhile; the output is removed.
+fn run(recipe: &serde_json::Value, encoding: &str) -> Result<Run> {
+    let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR"))?;
+    let (path, output) = (folder.path().join("recipe.json"), folder.path().join(format!("out.{encoding}")));
+    fs::write(&path, recipe.to_string())?;
+    let start = Instant::now();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_os"))
+        .arg("simulate")
+        .arg(&path)
+        .arg("-o")
+        .arg(&output)
+        .stdout(Stdio::null())
+        .spawn()?;
+    let status = format!("/proc/{}/status", child.id());
+    let mut peak = 0.0_f64;
+    let ending = loop {
+        // The kernel keeps the greatest value, so only what comes after the last look is missed.
+        let text = fs::read_to_string(&status).unwrap_or_default();
+        if let Some(line) = text.lines().find_map(|line| line.strip_prefix("VmHWM:")) {
+            peak = peak.max(line.trim().trim_end_matches(" kB").parse().unwrap_or(0.0));
+        }
+        if let Some(ending) = child.try_wait()? {
+            break ending;
+        }
+        thread::sleep(Duration::from_millis(2));
+    };
+    let seconds = start.elapsed().as_secs_f64();
+    ensure!(ending.success(), "os simulate ended with {ending}");
+    let reader = format::open(&output)?;
+    let rows = |table: &str| {
+        reader
+            .tables()
+            .iter()
+            .find(|stored| stored.table.name == table)
+            .and_then(|stored| stored.rows)
+            .unwrap_or(0)
+    };
+    let observations = (rows("point_observations") + rows("line_observations")) as f64;
+    Ok(Run { seconds, peak_mib: peak / 1024.0, observations })
+}
+
+/// A corridor of a length, in corridors of the first release, walked once round; nothing is seen that is
+/// farther than 8 m, so that length alone does not change how much a frame sees.
+fn corridor(length: f64, frames: u64, points: u32, lines: u32) -> serde_json::Value {
+    serde_json::json!({
+        "name": "corridor",
+        "trajectory": { "kind": "corridor", "frames": frames, "half_leg_m": [11.0 * length - 5.0, 11.0 * length - 5.0] },
+        "scene": [{ "kind": "ring-corridor", "outer_m": 22.0 * length, "inner_m": 22.0 * length - 8.8 }],
+        "points": { "count": points },
+        "lines": { "count": lines, "max_length_m": 2.0, "free": 0.5, "on_edges": 0.1, "oblique": 0.1 },
+        "visibility": { "depth_range_m": [0.1, 8.0] },
+        "noise": { "model": "gaussian" },
+    })
+}
+
+/// Time per observation, as frames and landmarks grow tenfold: where frames see as much, and where they see
+/// ten times as much.
+fn growth(figures: &mut Figures) -> Result<()> {
+    let small = corridor(1.0, 1000, 9_000, 1_000);
+    let longer = corridor(10.0, 10_000, 90_000, 10_000);
+    let denser = corridor(1.0, 10_000, 90_000, 10_000);
+    for encoding in ["parquet", "mcap"] {
+        let time = |recipe: &serde_json::Value, runs: usize| -> Result<(f64, f64)> {
+            let mut times = (0..runs)
+                .map(|_| run(recipe, encoding).map(|run| (run.seconds / run.observations, run.observations)))
+                .collect::<Result<Vec<_>>>()?;
+            times.sort_unstable_by(|one, other| one.0.total_cmp(&other.0));
+            Ok(times[runs / 2])
+        };
+        let mut per_observation = Vec::new();
+        for (what, recipe, runs) in [
+            ("1k frames x 10k landmarks", &small, 5),
+            ("10k x 100k, as many in a frame", &longer, 1),
+            ("10k x 100k, ten times as many in a frame", &denser, 1),
+        ] {
+            let (time, observations) = time(recipe, runs)?;
+            let millions = observations / 1e6;
+            figures.add(
+                format!("simulating {what} ({millions:.2} million observations), {encoding}"),
+                time * 1e9,
+                "ns an observation",
+                Bound::None,
+            );
+            per_observation.push(time);
+        }
+        for (what, time) in [("as many", per_observation[1]), ("ten times as many", per_observation[2])] {
+            figures.add(
+                format!(
+                    "time an observation at ten times the frames and landmarks, {what} in a frame, {encoding}"
+                ),
+                time / per_observation[0],
+                "times",
+                Bound::AtMost(1.3),
+            );
+        }
+    }
+    Ok(())
+}
+
+/// Memory while a hundred million observations are written.
+fn memory(figures: &mut Figures) -> Result<()> {
+    let mut recipe = corridor(1.0, 10_000, 190_000, 1_000);
+    if let Some(fields) = recipe.as_object_mut() {
+        fields.remove("noise");
+    }
+    recipe["visibility"] = serde_json::json!({});
+    for encoding in ["parquet", "mcap"] {
+        let run = run(&recipe, encoding)?;
+        let what = format!("simulating {:.1} million observations, {encoding}", run.observations / 1e6);
+        figures.add(format!("{what}: resident memory"), run.peak_mib, "MiB", Bound::AtMost(1024.0));
+        figures.add(format!("{what}: speed"), run.observations / run.seconds / 1e6, "million/s", Bound::None);
+    }
+    Ok(())
 }

@@ -52,7 +52,10 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         return list(stdout);
     };
     if args.foxglove && Encoding::of_output(output) != Encoding::Mcap {
-        anyhow::bail!("--foxglove adds channels to an MCAP file; {} would be a Parquet folder", output.display());
+        anyhow::bail!(
+            "--foxglove adds channels to an MCAP file; {} would be a Parquet folder",
+            output.display()
+        );
     }
     refuse_existing(output, args.force)?;
     let (mut recipe, folder) = recipe_of(name)?;

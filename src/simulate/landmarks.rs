@@ -17,7 +17,14 @@ struct Weighted {
 impl Weighted {
     fn new(weights: impl Iterator<Item = f64>) -> Self {
         let mut sum = 0.0;
-        Self { sums: weights.map(|weight| { sum += weight; sum }).collect() }
+        Self {
+            sums: weights
+                .map(|weight| {
+                    sum += weight;
+                    sum
+                })
+                .collect(),
+        }
     }
 
     fn total(&self) -> f64 {
@@ -52,7 +59,8 @@ impl<'a> PointSource<'a> {
 /// A point uniform on a face.
 fn point_on(face: &Face, random: &mut Random) -> Point3<f64> {
     let (first, second) = face.triangles();
-    let area = |corners: &[Point3<f64>; 3]| (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).norm();
+    let area =
+        |corners: &[Point3<f64>; 3]| (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).norm();
     let chosen = match second {
         Some(second) if random.uniform() * (area(&first) + area(&second)) >= area(&first) => second,
         _ => first,
@@ -148,7 +156,17 @@ impl<'a> LineSource<'a> {
             oblique.push(oblique_of_class[class].clone());
         }
         let face_weights = Weighted::new(scene.faces.iter().map(Face::area));
-        Self { scene, recipe, seed, families: families.list, edges, edge_weights, face_weights, along_sides, oblique }
+        Self {
+            scene,
+            recipe,
+            seed,
+            families: families.list,
+            edges,
+            edge_weights,
+            face_weights,
+            along_sides,
+            oblique,
+        }
     }
 
     /// The line of an index: the same whichever others are drawn.
@@ -230,7 +248,10 @@ impl<'a> LineSource<'a> {
         Some(match family {
             Some(family) => self.line_along(through, family, along, direction),
             None => DrawnLine {
-                segment: Segment { start: through + direction * along[0], end: through + direction * along[1] },
+                segment: Segment {
+                    start: through + direction * along[0],
+                    end: through + direction * along[1],
+                },
                 family: None,
             },
         })

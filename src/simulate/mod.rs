@@ -18,8 +18,8 @@ pub mod visibility;
 pub use error::Error;
 pub use random::Random;
 pub use recipe::{
-    CameraPreset, CameraRecipe, Density, Expected, LinesRecipe, MAX_RECIPE_BYTES, PointsRecipe, Recipe, named,
-    names,
+    CameraPreset, CameraRecipe, Density, Expected, LinesRecipe, MAX_RECIPE_BYTES, PointsRecipe, Recipe,
+    named, names,
 };
 pub use simulation::{Simulation, simulate};
 pub use survey::{SeenLine, Survey};

@@ -108,7 +108,11 @@ impl Recipe {
             && !self.name.contains(['/', '\\'])
             && !self.name.chars().any(char::is_control);
         if !named {
-            return Err(Error::value("name", "a name of 1 to 200 bytes, without slashes", format!("{:?}", self.name)));
+            return Err(Error::value(
+                "name",
+                "a name of 1 to 200 bytes, without slashes",
+                format!("{:?}", self.name),
+            ));
         }
         check_numbers("rate_hz", &[self.rate_hz], 1e-3, 1e6, "Hz")?;
         if self.min_observations == 0 {

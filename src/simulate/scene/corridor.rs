@@ -58,9 +58,8 @@ impl RingCorridor {
     pub(super) fn add_to(&self, scene: &mut Scene, object: u32) {
         let world_from_object = self.placement().world_from_object();
         let (outer, inner, half) = (0.5 * self.outer_m, 0.5 * self.inner_m, 0.5 * self.height_m);
-        let corners = |side: f64, z: f64| {
-            [[-side, -side, z], [side, -side, z], [side, side, z], [-side, side, z]]
-        };
+        let corners =
+            |side: f64, z: f64| [[-side, -side, z], [side, -side, z], [side, side, z], [-side, side, z]];
         let mut face = |corners: [[f64; 3]; 4]| {
             scene.faces.push(Face::quad(placed(&world_from_object, corners), object));
         };

@@ -51,7 +51,8 @@ fn joined(points: &[Point3<f64>], sides: Vec<[usize; 2]>) -> Vec<[usize; 2]> {
     for (index, side) in sides.iter().enumerate() {
         side.iter().for_each(|end| sides_at.entry(*end).or_default().push(index));
     }
-    let other_end = |side: usize, end: usize| if sides[side][0] == end { sides[side][1] } else { sides[side][0] };
+    let other_end =
+        |side: usize, end: usize| if sides[side][0] == end { sides[side][1] } else { sides[side][0] };
     // The side that goes straight on from an end where no third side meets.
     let next = |side: usize, end: usize| -> Option<usize> {
         let [a, b] = sides_at.get(&end)?.as_slice() else { return None };
@@ -88,8 +89,9 @@ mod tests {
     #[test]
     fn sides_that_go_straight_on_are_one_edge() {
         // A strip of three squares, cut into triangles; its long sides are three sides each.
-        let points: Vec<_> =
-            (0..4).flat_map(|x| [Point3::new(f64::from(x), 0.0, 0.0), Point3::new(f64::from(x), 1.0, 0.0)]).collect();
+        let points: Vec<_> = (0..4)
+            .flat_map(|x| [Point3::new(f64::from(x), 0.0, 0.0), Point3::new(f64::from(x), 1.0, 0.0)])
+            .collect();
         let triangles: Vec<[usize; 3]> =
             (0..3).flat_map(|x| [[2 * x, 2 * x + 2, 2 * x + 1], [2 * x + 1, 2 * x + 2, 2 * x + 3]]).collect();
         let mut lengths: Vec<f64> = creases(&points, &triangles, 0.1, 0).iter().map(Edge::length).collect();

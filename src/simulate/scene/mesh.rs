@@ -145,17 +145,25 @@ fn read(path: &Path) -> Result<Soup, Error> {
 }
 
 fn read_obj(reader: &mut impl BufRead) -> Result<Soup, String> {
-    let options = tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, ..Default::default() };
+    let options = tobj::LoadOptions {
+        triangulate: true,
+        ignore_points: true,
+        ignore_lines: true,
+        ..Default::default()
+    };
     let no_materials = |_: &Path| Ok(<(Vec<tobj::Material>, _)>::default());
-    let (models, _) = tobj::load_obj_buf(reader, &options, no_materials).map_err(|error| error.to_string())?;
+    let (models, _) =
+        tobj::load_obj_buf(reader, &options, no_materials).map_err(|error| error.to_string())?;
     let mut soup = Soup::default();
     for model in models {
         let first = soup.vertices.len();
         soup.vertices.extend(model.mesh.positions.chunks_exact(3).map(|xyz| [xyz[0], xyz[1], xyz[2]]));
         soup.triangles.extend(
-            model.mesh.indices.chunks_exact(3).map(|corners| {
-                [0, 1, 2].map(|corner| first + corners[corner] as usize)
-            }),
+            model
+                .mesh
+                .indices
+                .chunks_exact(3)
+                .map(|corners| [0, 1, 2].map(|corner| first + corners[corner] as usize)),
         );
         if soup.triangles.len() > MAX_FACES {
             return Err(format!("over {MAX_FACES} triangles"));
@@ -219,7 +227,14 @@ fn read_ply(reader: impl BufRead) -> Result<Soup, (Option<usize>, String)> {
     let mut soup = Soup::default();
     for (name, element) in &header.elements {
         if element.count > 3 * MAX_FACES || element.properties.is_empty() {
-            return Err((None, format!("element {name} with a count of {} and {} properties", element.count, element.properties.len())));
+            return Err((
+                None,
+                format!(
+                    "element {name} with a count of {} and {} properties",
+                    element.count,
+                    element.properties.len()
+                ),
+            ));
         }
         let rows = parser.read_payload_for_element(&mut reader, element, &header).map_err(failed)?;
         match name.as_str() {

@@ -39,15 +39,18 @@ impl Placement {
     /// Looks at the numbers.
     pub(super) fn check(&self, place: &str) -> Result<(), Error> {
         check_numbers(&format!("{place}.position_m"), &self.position_m, -1e6, 1e6, "m")?;
-        check_numbers(&format!("{place}.roll_pitch_yaw_deg"), &self.roll_pitch_yaw_deg, -3600.0, 3600.0, "deg")
+        check_numbers(
+            &format!("{place}.roll_pitch_yaw_deg"),
+            &self.roll_pitch_yaw_deg,
+            -3600.0,
+            3600.0,
+            "deg",
+        )
     }
 }
 
 /// Corners in the object's own space, taken to the world.
-pub(super) fn placed<const N: usize>(
-    world_from_object: &Pose,
-    corners: [[f64; 3]; N],
-) -> [Point3<f64>; N] {
+pub(super) fn placed<const N: usize>(world_from_object: &Pose, corners: [[f64; 3]; N]) -> [Point3<f64>; N] {
     corners.map(|corner| *world_from_object * Point3::from(corner))
 }
 

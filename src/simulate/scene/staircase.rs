@@ -53,7 +53,9 @@ impl Staircase {
         if !(1..=100_000).contains(&self.steps) {
             return Err(Error::value(format!("{place}.steps"), "1 to 100000 steps", self.steps));
         }
-        for (name, number) in [("tread_m", self.tread_m), ("riser_m", self.riser_m), ("width_m", self.width_m)] {
+        for (name, number) in
+            [("tread_m", self.tread_m), ("riser_m", self.riser_m), ("width_m", self.width_m)]
+        {
             check_numbers(&format!("{place}.{name}"), &[number], 1e-3, 1e3, "m")?;
         }
         self.placement().check(place)

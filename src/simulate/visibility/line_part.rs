@@ -61,8 +61,8 @@ pub fn visible_part(
 
 #[cfg(test)]
 mod tests {
-    use super::super::view::tests::{camera, point, view};
     use super::super::Bounds;
+    use super::super::view::tests::{camera, point, view};
     use super::*;
     use crate::geometry::Pose;
     use crate::simulate::scene::{Face, Scene};

@@ -1,7 +1,7 @@
 //! What a camera sees: the frustum, and what stands in the way.
 
-mod line_part;
 mod line_index;
+mod line_part;
 mod occluders;
 mod places;
 mod point_index;

@@ -56,7 +56,8 @@ impl Triangle {
 
     /// Whether the triangle stands between an eye and a point, which lies a direction from it.
     fn hides(&self, eye: &Point3<f64>, direction: &Vector3<f64>, point: &Point3<f64>) -> bool {
-        self.meet(eye, direction).is_some_and(|along| along > 0.0 && along < 1.0 - BEHIND) && !self.holds(point)
+        self.meet(eye, direction).is_some_and(|along| along > 0.0 && along < 1.0 - BEHIND)
+            && !self.holds(point)
     }
 }
 
@@ -218,9 +219,12 @@ impl Occluders {
         let mut faces: Vec<u32> = Vec::new();
         self.search(near, |index, triangle| {
             let corners = triangle.corners();
-            let (low, high) = (corners[0].inf(&corners[1].inf(&corners[2])), corners[0].sup(&corners[1].sup(&corners[2])));
+            let (low, high) =
+                (corners[0].inf(&corners[1].inf(&corners[2])), corners[0].sup(&corners[1].sup(&corners[2])));
             if near(&low, &high) {
-                let before = index.checked_sub(1).filter(|before| self.triangles[*before as usize].face == triangle.face);
+                let before = index
+                    .checked_sub(1)
+                    .filter(|before| self.triangles[*before as usize].face == triangle.face);
                 let first = before.unwrap_or(index);
                 if !faces.contains(&first) {
                     faces.push(first);
@@ -334,7 +338,13 @@ impl Fan {
         Some(Self { eye: *eye, normal: cross / squared.sqrt(), duals })
     }
 
-    fn may_meet(&self, low: &Point3<f64>, high: &Point3<f64>, fan_low: &Point3<f64>, fan_high: &Point3<f64>) -> bool {
+    fn may_meet(
+        &self,
+        low: &Point3<f64>,
+        high: &Point3<f64>,
+        fan_low: &Point3<f64>,
+        fan_high: &Point3<f64>,
+    ) -> bool {
         let apart = (0..3).any(|axis| low[axis] > fan_high[axis] || high[axis] < fan_low[axis]);
         if apart {
             return false;
@@ -357,12 +367,15 @@ impl Fan {
             }
             if heights[corner] * heights[next] < 0.0 {
                 let part = heights[corner] / (heights[corner] - heights[next]);
-                cut.push([0, 1].map(|axis| flat[corner][axis] + part * (flat[next][axis] - flat[corner][axis])));
+                cut.push(
+                    [0, 1].map(|axis| flat[corner][axis] + part * (flat[next][axis] - flat[corner][axis])),
+                );
             }
         }
         let (first, last) = (*cut.first()?, *cut.last()?);
         // What hides lies in front: α, β ≥ 0 and α + β < 1. Clipped like any segment.
-        let conditions = |[alpha, beta]: [f64; 2]| [alpha, beta, 1.0 - BEHIND - alpha - beta, alpha + beta - 1e-12];
+        let conditions =
+            |[alpha, beta]: [f64; 2]| [alpha, beta, 1.0 - BEHIND - alpha - beta, alpha + beta - 1e-12];
         let (from, to) = (conditions(first), conditions(last));
         let (mut low, mut high) = (0.0_f64, 1.0_f64);
         for (at_first, at_last) in from.into_iter().zip(to) {
@@ -440,12 +453,16 @@ mod tests {
     #[test]
     fn a_face_does_not_hide_what_lies_on_it() {
         let corner = |x, y| Point3::new(x, y, 2.0);
-        let wall = Face::quad([corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)], 0);
+        let wall =
+            Face::quad([corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)], 0);
         let occluders = Occluders::new(&Scene { faces: vec![wall], edges: Vec::new() });
         let eye = Point3::origin();
         assert!(!occluders.hides(&eye, &corner(0.3, 0.4)));
         assert!(occluders.hides(&eye, &Point3::new(0.3, 0.4, 2.001)));
-        assert_eq!(occluders.hidden_parts(&eye, &corner(-1.0, 0.2), &corner(1.0, 0.2)), Vec::<[f64; 2]>::new());
+        assert_eq!(
+            occluders.hidden_parts(&eye, &corner(-1.0, 0.2), &corner(1.0, 0.2)),
+            Vec::<[f64; 2]>::new()
+        );
         // Twice as far away, the wall covers from −2 to 2 of a segment from −4 to 4.
         let parts = occluders.hidden_parts(&eye, &Point3::new(-4.0, 0.1, 4.0), &Point3::new(4.0, 0.1, 4.0));
         assert!(parts.len() == 1 && (parts[0][0] - 0.25).abs() < 1e-8 && (parts[0][1] - 0.75).abs() < 1e-8);

@@ -4,7 +4,7 @@ use nalgebra::Point3;
 
 use super::places::PlaceSet;
 use super::shadow::{Between, Few, Shadows};
-use super::tree::Tree;
+use super::tree::{Node, Tree};
 use super::{Occluders, View};
 
 /// Points sorted into a tree of boxes.
@@ -12,9 +12,15 @@ use super::{Occluders, View};
 pub struct PointIndex {
     points: Vec<Point3<f64>>,
     tree: Tree,
+    /// The points of each node, for nodes so large that one set is united with another faster than points are
+    /// added to it one by one.
+    sets: Vec<Option<PlaceSet>>,
     /// Greatest coordinate, metres.
     reach: f64,
 }
+
+/// With more points than these (and few nodes in view) sets would only take memory.
+const MOST_IN_SETS: usize = 1 << 22;
 
 impl PointIndex {
     /// An index of points, named by their places.
@@ -23,7 +29,16 @@ impl PointIndex {
         let boxes: Vec<_> = points.iter().map(|point| [*point, *point]).collect();
         let tree = Tree::new(&boxes);
         let reach = points.iter().fold(0.0, |reach: f64, point| reach.max(point.coords.amax()));
-        Self { points: tree.order.iter().map(|id| points[*id as usize]).collect(), tree, reach }
+        let large = points.len() / 64 + 64;
+        let set = |node: &Node| {
+            (node.end - node.begin >= large && points.len() <= MOST_IN_SETS).then(|| {
+                let mut set = PlaceSet::new(points.len());
+                tree.order[node.begin..node.end].iter().for_each(|id| set.insert(*id));
+                set
+            })
+        };
+        let sets = tree.nodes.iter().map(set).collect();
+        Self { points: tree.order.iter().map(|id| points[*id as usize]).collect(), tree, sets, reach }
     }
 
     /// Number of points.
@@ -88,7 +103,10 @@ impl Walk<'_> {
         };
         if let Some(few) = few {
             if inside && few.as_ref().is_some_and(Few::is_empty) {
-                index.tree.order[node.begin..node.end].iter().for_each(|id| self.set.insert(*id));
+                match &index.sets[at] {
+                    Some(set) => self.set.unite(set),
+                    None => index.tree.order[node.begin..node.end].iter().for_each(|id| self.set.insert(*id)),
+                }
             } else if node.exit == at + 1 {
                 self.leaf(node.begin..node.end, inside, few.as_ref());
             } else {
@@ -135,7 +153,11 @@ mod tests {
                 .map(|(quad, [a, b, c], size)| {
                     let (b, c) = (a + (b - a) * size, a + (c - a) * size);
                     let (along, up) = (b - a, c - a);
-                    if quad { Face::quad([a, b, b + up, a + up], 0) } else { Face::triangle([a, a + along, c], 0) }
+                    if quad {
+                        Face::quad([a, b, b + up, a + up], 0)
+                    } else {
+                        Face::triangle([a, a + along, c], 0)
+                    }
                 })
                 .collect(),
             edges: Vec::new(),

@@ -78,7 +78,12 @@ impl<'a> Shadows<'a> {
     /// What stands between the eye and a box, given by its middle and half its size.
     ///
     /// * `known` — the answer for a box about it.
-    pub(super) fn between(&mut self, center: &Point3<f64>, half: &Vector3<f64>, known: Option<&Few>) -> Between {
+    pub(super) fn between(
+        &mut self,
+        center: &Point3<f64>,
+        half: &Vector3<f64>,
+        known: Option<&Few>,
+    ) -> Between {
         let middle = center - self.eye;
         let mut few = Few::default();
         if let Some(known) = known {

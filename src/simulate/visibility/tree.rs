@@ -49,10 +49,11 @@ impl Tree {
     /// Adds the node of a run of the order, which begins at `begin`, and those within it.
     fn grow(&mut self, boxes: &[[Point3<f64>; 2]], run: &[(u64, u32)], begin: usize, mut shift: u32) {
         let Some((_, first)) = run.first() else { return };
-        let (low, high) = run.iter().fold(
-            (boxes[*first as usize][0], boxes[*first as usize][1]),
-            |(low, high), (_, id)| (low.inf(&boxes[*id as usize][0]), high.sup(&boxes[*id as usize][1])),
-        );
+        let (low, high) = run
+            .iter()
+            .fold((boxes[*first as usize][0], boxes[*first as usize][1]), |(low, high), (_, id)| {
+                (low.inf(&boxes[*id as usize][0]), high.sup(&boxes[*id as usize][1]))
+            });
         let at = self.nodes.len();
         let (center, half) = (nalgebra::center(&low, &high), 0.5 * (high - low));
         self.nodes.push(Node { center, half, begin, end: begin + run.len(), exit: 0 });

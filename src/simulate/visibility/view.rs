@@ -58,8 +58,9 @@ impl View {
             bounds,
             planes: [(Vector3::zeros(), 0.0); 6],
         };
-        let in_world =
-            |(normal, offset): (Vector3<f64>, f64)| (rotation.tr_mul(&normal), offset + normal.dot(&translation));
+        let in_world = |(normal, offset): (Vector3<f64>, f64)| {
+            (rotation.tr_mul(&normal), offset + normal.dot(&translation))
+        };
         view.planes = view.camera_planes().map(in_world);
         view
     }

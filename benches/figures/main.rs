@@ -10,6 +10,7 @@ mod data;
 mod figure;
 mod reading;
 mod scale;
+mod simulating;
 mod size;
 mod validating;
 
@@ -27,11 +28,12 @@ fn main() -> Result<ExitCode> {
     }
     let wanted: Vec<String> =
         std::env::args().skip(1).filter(|argument| !argument.starts_with('-')).collect();
-    let all: [(&str, Measure); 4] = [
+    let all: [(&str, Measure); 5] = [
         ("reading", reading::measure),
         ("size", size::measure),
         ("validating", validating::measure),
         ("scale", scale::measure),
+        ("simulating", simulating::measure),
     ];
     let mut figures = Figures::default();
     for (name, measure) in all {

@@ -1,8 +1,8 @@
 //! Writing a sequence whose frames are made twice, so that none has to be kept.
 //!
 //! Correspondences and statistics stand before the frames in a file, and follow from them. So frames are made
-//! once to count, and once more to be written. In between four bytes are kept for each observation and a bit
-//! for its measurement.
+//! once to count, and once more to be written. In between about two bytes are kept for each observation and a
+//! bit for its measurement.
 
 use std::path::Path;
 use std::sync::mpsc::sync_channel;
@@ -18,8 +18,8 @@ use crate::structure::{
     PointObservation, Record, StructuralGroup,
 };
 
-/// Rows of correspondences that are turned round at once; each such piece costs a pass over all rows.
-const PIECE_ROWS: u64 = 1 << 22;
+/// Rows of correspondences that are turned round at once.
+const PIECE_ROWS: u64 = 1 << 20;
 
 /// Frames that were made and wait to be taken: more would only cost memory.
 const WAITING: usize = 4;

@@ -26,6 +26,8 @@ use crate::structure::TableInfo;
 
 /// Rows of a row group: enough to compress, few enough to hold several of them.
 pub(super) const ROW_GROUP_ROWS: usize = 1 << 18;
+/// Bytes in memory of a row group, for rows that hold long lists.
+const ROW_GROUP_BYTES: usize = 1 << 26;
 /// Rows of a data page: what is read, at least, to see one frame.
 ///
 /// Pages are compressed each by itself. The published columns of office3, at zstd 6, over their zip:
@@ -161,6 +163,7 @@ pub(super) struct ParquetTableWriter {
     factories: Vec<LayoutFactory>,
     pending: Vec<RecordBatch>,
     pending_rows: usize,
+    pending_bytes: usize,
     row_groups: usize,
     /// The layout of each column, and the bytes a row that it took when it was chosen.
     chosen: Vec<Choice>,
@@ -196,6 +199,7 @@ impl ParquetTableWriter {
             factories,
             pending: Vec::new(),
             pending_rows: 0,
+            pending_bytes: 0,
             row_groups: 0,
             chosen: Vec::new(),
         })
@@ -206,8 +210,9 @@ impl ParquetTableWriter {
         let room = ROW_GROUP_ROWS - self.pending_rows;
         if batch.num_rows() < room {
             self.pending_rows += batch.num_rows();
+            self.pending_bytes += batch.get_array_memory_size();
             self.pending.push(batch);
-            return Ok(());
+            return if self.pending_bytes >= ROW_GROUP_BYTES { self.flush() } else { Ok(()) };
         }
         let rest = batch.slice(room, batch.num_rows() - room);
         self.pending.push(batch.slice(0, room));
@@ -221,7 +226,7 @@ impl ParquetTableWriter {
 
     fn flush(&mut self) -> Result<(), Error> {
         let batches = std::mem::take(&mut self.pending);
-        self.pending_rows = 0;
+        (self.pending_rows, self.pending_bytes) = (0, 0);
         let failed = Error::container(&self.path, "Parquet");
         let write = || -> Result<(), ParquetError> {
             let batch = concat_batches(&self.schema, &batches)?;

@@ -18,6 +18,8 @@ use crate::structure::{
 
 /// Rows that wait before they are encoded: one message of a whole-sequence table.
 const PENDING_ROWS: usize = 1 << 14;
+/// Bytes of them, for rows that hold long lists.
+const PENDING_BYTES: usize = 1 << 22;
 
 /// How a sequence is written.
 #[derive(Clone, Debug, Default)]
@@ -65,13 +67,33 @@ enum Backend {
 
 struct TableState<R> {
     pending: Vec<R>,
+    /// Bytes of the rows that wait, of a table of the whole sequence.
+    pending_bytes: usize,
     last: Option<R>,
     digest: ContentDigest,
 }
 
 impl<R> Default for TableState<R> {
     fn default() -> Self {
-        Self { pending: Vec::new(), last: None, digest: ContentDigest::default() }
+        Self { pending: Vec::new(), pending_bytes: 0, last: None, digest: ContentDigest::default() }
+    }
+}
+
+impl<R: Record> TableState<R> {
+    /// How many of the rows may wait with those that do, and whether it is time to write then. What is
+    /// written at once depends on the rows alone, not on how they were handed over.
+    fn room(&mut self, rows: &[R]) -> (usize, bool) {
+        let mut bytes = Vec::new();
+        for (index, row) in rows.iter().enumerate() {
+            bytes.clear();
+            row.digest(&mut bytes);
+            self.pending_bytes += bytes.len();
+            if self.pending_bytes >= PENDING_BYTES || self.pending.len() + index + 1 >= PENDING_ROWS {
+                self.pending_bytes = 0;
+                return (index + 1, true);
+            }
+        }
+        (rows.len(), false)
     }
 }
 
@@ -183,11 +205,15 @@ impl SequenceWriter {
         if let Some(foxglove) = &mut self.foxglove {
             foxglove.remember(rows);
         }
-        for run in rows.chunks(PENDING_ROWS) {
+        let mut rest = rows;
+        while !rest.is_empty() {
+            let (count, full) = self.state::<R>().room(rest);
+            let (run, later) = rest.split_at(count);
             self.enqueue(run)?;
-            if self.state::<R>().pending.len() >= PENDING_ROWS {
+            if full {
                 self.flush::<R>()?;
             }
+            rest = later;
         }
         Ok(())
     }

@@ -13,7 +13,7 @@ use sha2::{Digest, Sha256};
 use super::landmarks::{DrawnLine, LineSource, PointSource};
 use super::scene::Scene;
 use super::survey::{SeenLine, Survey};
-use super::visibility::{Occluders, View};
+use super::visibility::{Occluders, Places, View};
 use super::{Density, Error, Recipe};
 use crate::geometry::Segment;
 use crate::structure::{
@@ -46,8 +46,8 @@ pub struct Simulation {
     points: Vec<Point3<f64>>,
     lines: Vec<Segment>,
     groups: Vec<StructuralGroup>,
-    seen_points: Vec<Box<[u32]>>,
-    seen_lines: Vec<Box<[SeenLine]>>,
+    seen_points: Vec<Places>,
+    seen_lines: Vec<Vec<SeenLine>>,
 }
 
 /// Makes the sequence of a recipe.
@@ -93,9 +93,7 @@ pub fn simulate(
     let (points, seen_points) = filling("points").fill(
         Wanted::of(recipe.points.count, recipe.points.density.map(Density::points_per_frame)),
         |index| Ok(Some(source.point(index))),
-        |points, tick| survey.points(points, tick),
-        |seen| *seen,
-        |_, place| place,
+        |points, tick| survey.points_as(points, tick, Places::from_iter),
     )?;
     let source = LineSource::new(&scene, &recipe.lines, seed);
     let (drawn, seen_lines) = filling("lines").fill(
@@ -108,8 +106,6 @@ pub fn simulate(
             let segments: Vec<Segment> = lines.iter().map(|line| line.segment).collect();
             survey.lines(&segments, tick)
         },
-        |seen| seen.line,
-        |seen, place| SeenLine { line: place, ..seen },
     )?;
     Ok(Simulation {
         recipe: recipe.clone(),
@@ -165,8 +161,38 @@ impl Wanted {
     }
 }
 
-/// Landmarks, and for each frame what it sees of them.
-type Filled<T, S> = (Vec<T>, Vec<Box<[S]>>);
+/// What a frame sees of the landmarks of a kind, ascending by their places.
+trait SeenList: Default {
+    fn places(&self) -> impl Iterator<Item = u32>;
+
+    /// Adds what is seen of landmarks that have a name, by their names; these ascend with the places, and are
+    /// above all that came before.
+    fn take(&mut self, new: Self, name_of: &[Option<u32>]);
+}
+
+impl SeenList for Places {
+    fn places(&self) -> impl Iterator<Item = u32> {
+        self.iter()
+    }
+
+    fn take(&mut self, new: Self, name_of: &[Option<u32>]) {
+        new.iter().filter_map(|place| name_of[place as usize]).for_each(|name| self.push(name));
+        self.shrink_to_fit();
+    }
+}
+
+impl SeenList for Vec<SeenLine> {
+    fn places(&self) -> impl Iterator<Item = u32> {
+        self.iter().map(|seen| seen.line)
+    }
+
+    fn take(&mut self, new: Self, name_of: &[Option<u32>]) {
+        self.extend(
+            new.into_iter().filter_map(|seen| Some(SeenLine { line: name_of[seen.line as usize]?, ..seen })),
+        );
+        self.shrink_to_fit();
+    }
+}
 
 /// Draws landmarks until enough of them are seen.
 struct Filling<'a> {
@@ -181,18 +207,15 @@ impl Filling<'_> {
     ///
     /// * `draw` — the landmark of an index, `None` for one that is not to be used.
     /// * `see` — for each frame what it sees of some landmarks, ascending by their places.
-    /// * `place_of`, `moved` — read and change the place of a landmark in what is seen of it.
-    fn fill<T, S: Copy>(
+    fn fill<T, S: SeenList>(
         &self,
         wanted: Wanted,
         mut draw: impl FnMut(u64) -> Result<Option<T>, Error>,
-        see: impl Fn(&[T], &(dyn Fn() + Sync)) -> Vec<Vec<S>>,
-        place_of: impl Fn(&S) -> u32,
-        moved: impl Fn(S, u32) -> S,
-    ) -> Result<Filled<T, S>, Error> {
+        see: impl Fn(&[T], &(dyn Fn() + Sync)) -> Vec<S>,
+    ) -> Result<(Vec<T>, Vec<S>), Error> {
         let mut kept: Vec<T> = Vec::new();
-        let mut seen: Vec<Vec<S>> = Vec::new();
-        seen.resize_with(self.frames, Vec::new);
+        let mut seen: Vec<S> = Vec::new();
+        seen.resize_with(self.frames, S::default);
         let (mut target, mut batch) = match wanted {
             Wanted::Count(count) => (count, count),
             Wanted::PerFrame(_) => (0, PILOT as u64),
@@ -210,7 +233,7 @@ impl Filling<'_> {
             let tick = || (self.progress)(self.what, done.fetch_add(1, Ordering::Relaxed) + 1, total);
             let found = see(&landmarks, &tick);
             let mut counts = vec![0_u32; landmarks.len()];
-            found.iter().flatten().for_each(|one| counts[place_of(one) as usize] += 1);
+            found.iter().for_each(|list| list.places().for_each(|place| counts[place as usize] += 1));
             if let Some(per_frame) = pilot.take() {
                 target = self.target(per_frame, &found, &counts)?;
             }
@@ -224,10 +247,7 @@ impl Filling<'_> {
                 }
             }
             for (all, new) in seen.iter_mut().zip(found) {
-                all.extend(new.into_iter().filter_map(|one| {
-                    let name = name_of[place_of(&one) as usize]?;
-                    Some(moved(one, name))
-                }));
+                all.take(new, &name_of);
             }
             let missing = target - (kept.len() as u64).min(target);
             if missing > 0 && drawn > MOST_DRAWS * target + 1000 {
@@ -248,12 +268,12 @@ impl Filling<'_> {
             let next = (missing as f64 / rate * 1.1) as u64 + 16;
             batch = if missing == 0 { 0 } else { next };
         }
-        Ok((kept, seen.into_iter().map(Vec::into_boxed_slice).collect()))
+        Ok((kept, seen))
     }
 
     /// Landmarks that make the median frame see so many, by what frames saw of the pilot.
-    fn target<S>(&self, per_frame: f64, found: &[Vec<S>], counts: &[u32]) -> Result<u64, Error> {
-        let mut per_view: Vec<usize> = found.iter().map(Vec::len).collect();
+    fn target<S: SeenList>(&self, per_frame: f64, found: &[S], counts: &[u32]) -> Result<u64, Error> {
+        let mut per_view: Vec<usize> = found.iter().map(|list| list.places().count()).collect();
         per_view.sort_unstable();
         let median = per_view.get(per_view.len() / 2).copied().unwrap_or(0).max(1);
         let usable = counts.iter().filter(|count| **count >= self.min_observations).count();
@@ -407,8 +427,8 @@ impl Simulation {
         let point_observations: Vec<PointObservation> = self.seen_points[index]
             .iter()
             .filter_map(|place| {
-                let (pixel, depth) = view.project(&self.points[*place as usize])?;
-                let point_id = PointId(i64::from(*place));
+                let (pixel, depth) = view.project(&self.points[place as usize])?;
+                let point_id = PointId(i64::from(place));
                 Some(PointObservation { frame_id, point_id, u: pixel.x, v: pixel.y, depth: Some(depth) })
             })
             .collect();

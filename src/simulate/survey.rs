@@ -4,7 +4,7 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 
 use super::visibility::{
-    Occluders, PointIndex, View, Visibility, VisibilityModel, sampled_part, visible_part,
+    LineIndex, Occluders, PlaceSet, PointIndex, View, Visibility, VisibilityModel, sampled_part, visible_part,
 };
 use crate::geometry::Segment;
 
@@ -38,13 +38,26 @@ impl Survey {
     /// * `seen` — called after each frame, from any thread.
     #[must_use]
     pub fn points(&self, points: &[Point3<f64>], seen: &(dyn Fn() + Sync)) -> Vec<Vec<u32>> {
+        self.points_as(points, seen, |places| places)
+    }
+
+    /// As [`points`](Self::points), each frame's in a form of its own, which may take less memory.
+    pub(super) fn points_as<T: Send>(
+        &self,
+        points: &[Point3<f64>],
+        seen: &(dyn Fn() + Sync),
+        form: impl Fn(Vec<u32>) -> T + Sync,
+    ) -> Vec<T> {
         let index = PointIndex::new(points);
-        let with_occlusion = self.visibility.model == VisibilityModel::Occlusion;
+        let occluders = match self.visibility.model {
+            VisibilityModel::Occlusion => Some(&self.occluders),
+            VisibilityModel::Frustum => None,
+        };
+        let set = || PlaceSet::new(points.len());
         self.views
             .par_iter()
-            .map(|view| {
-                let found = index
-                    .in_view(view, |point| !with_occlusion || !self.occluders.hides(&view.center(), point));
+            .map_init(set, |set, view| {
+                let found = form(index.seen(view, occluders, set));
                 seen();
                 found
             })
@@ -63,16 +76,21 @@ impl Survey {
                 visible_part(view, &self.occluders, &line.start, &line.end, min_length_px)
             }
         };
+        let index = LineIndex::new(lines);
+        let set = || PlaceSet::new(lines.len());
         self.views
             .par_iter()
-            .map(|view| {
-                let found = (0_u32..)
-                    .zip(lines)
-                    .filter_map(|(place, line)| {
+            .map_init(set, |set, view| {
+                let mut found: Vec<SeenLine> = index
+                    .near(view, set)
+                    .into_iter()
+                    .filter_map(|place| {
+                        let line = &lines[place as usize];
                         view.classify(&line.start.inf(&line.end), &line.start.sup(&line.end))?;
                         Some(SeenLine { line: place, part: part(view, line)? })
                     })
                     .collect();
+                found.shrink_to_fit();
                 seen();
                 found
             })

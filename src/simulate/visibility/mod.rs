@@ -1,9 +1,13 @@
 //! What a camera sees: the frustum, and what stands in the way.
 
+mod line_index;
 mod line_part;
 mod occluders;
+mod places;
 mod point_index;
 mod sampled_line;
+mod shadow;
+mod tree;
 mod view;
 
 use schemars::JsonSchema;
@@ -12,8 +16,10 @@ use serde::{Deserialize, Serialize};
 use super::Error;
 use super::scene::check_numbers;
 
+pub use line_index::LineIndex;
 pub use line_part::visible_part;
 pub use occluders::{Hit, Occluders};
+pub use places::{PlaceSet, Places};
 pub use point_index::PointIndex;
 pub use sampled_line::sampled_part;
 pub use view::{Bounds, View};

@@ -53,6 +53,12 @@ impl Triangle {
         let v = direction.dot(&along) * scale;
         (v >= -slack && u + v <= 1.0 + slack).then(|| second.dot(&along) * scale)
     }
+
+    /// Whether the triangle stands between an eye and a point, which lies a direction from it.
+    fn hides(&self, eye: &Point3<f64>, direction: &Vector3<f64>, point: &Point3<f64>) -> bool {
+        self.meet(eye, direction).is_some_and(|along| along > 0.0 && along < 1.0 - BEHIND)
+            && !self.holds(point)
+    }
 }
 
 impl Bounded<f64, 3> for Triangle {
@@ -131,12 +137,12 @@ impl Occluders {
     fn search<'a>(
         &'a self,
         mut passes: impl FnMut(&Point3<f64>, &Point3<f64>) -> bool,
-        mut found: impl FnMut(&'a Triangle) -> bool,
+        mut found: impl FnMut(u32, &'a Triangle) -> bool,
     ) {
         let mut at = 0;
         while let Some(node) = self.nodes.get(at) {
             if node.triangle != NO_TRIANGLE {
-                if found(&self.triangles[node.triangle as usize]) {
+                if found(node.triangle, &self.triangles[node.triangle as usize]) {
                     return;
                 }
                 at = node.exit as usize;
@@ -156,14 +162,77 @@ impl Occluders {
         let mut hidden = false;
         self.search(
             |low, high| slabs.meet(low, high, 1.0),
-            |triangle| {
-                hidden =
-                    triangle.meet(eye, &direction).is_some_and(|along| along > 0.0 && along < 1.0 - BEHIND)
-                        && !triangle.holds(point);
+            |_, triangle| {
+                hidden = triangle.hides(eye, &direction, point);
                 hidden
             },
         );
         hidden
+    }
+
+    /// Whether a face, named by its first triangle, stands between an eye and a point.
+    pub(super) fn face_hides(&self, first: u32, eye: &Point3<f64>, point: &Point3<f64>) -> bool {
+        let direction = point - eye;
+        self.triangles_of(first).iter().any(|triangle| triangle.hides(eye, &direction, point))
+    }
+
+    /// The triangles of a face, named by its first one.
+    fn triangles_of(&self, first: u32) -> &[Triangle] {
+        let first = first as usize;
+        let face = self.triangles[first].face;
+        let two = self.triangles.get(first + 1).is_some_and(|next| next.face == face);
+        &self.triangles[first..=first + usize::from(two)]
+    }
+
+    /// The corners of a face in order round it, and their number; the face is named by its first triangle.
+    pub(super) fn outline(&self, first: u32) -> ([Point3<f64>; 4], usize) {
+        let triangles = self.triangles_of(first);
+        let [a, b, c] = triangles[0].corners();
+        // Two triangles of a face share its first corner and its diagonal.
+        triangles.get(1).map_or(([a, b, c, c], 3), |second| ([a, b, c, second.corners()[2]], 4))
+    }
+
+    /// Faces, named by their first triangles, that may stand between an eye and a box; `None` when they are
+    /// more than `most`.
+    pub(super) fn faces_between(
+        &self,
+        eye: &Point3<f64>,
+        center: &Point3<f64>,
+        half: &Vector3<f64>,
+        most: usize,
+    ) -> Option<Vec<u32>> {
+        // Lines of sight stay in the box about eye and target, and within the target's radius of the axis.
+        let (low, high) = (eye.inf(&(center - half)), eye.sup(&(center + half)));
+        let (axis, radius) = (center - eye, half.norm());
+        let scale = axis.norm_squared().recip();
+        let slack = 1e-9 * (1.0 + low.coords.amax().max(high.coords.amax()));
+        let near = |box_low: &Point3<f64>, box_high: &Point3<f64>| {
+            if (0..3).any(|axis| box_low[axis] > high[axis] + slack || box_high[axis] < low[axis] - slack) {
+                return false;
+            }
+            let reach = 0.5 * (box_high - box_low).norm() + radius + slack;
+            let from_eye = nalgebra::center(box_low, box_high) - eye;
+            let part = (from_eye.dot(&axis) * scale).clamp(0.0, 1.0);
+            // A target about the eye has no axis; the NaN of its part passes.
+            !((from_eye - axis * part).norm_squared() > reach * reach)
+        };
+        let mut faces: Vec<u32> = Vec::new();
+        self.search(near, |index, triangle| {
+            let corners = triangle.corners();
+            let (low, high) =
+                (corners[0].inf(&corners[1].inf(&corners[2])), corners[0].sup(&corners[1].sup(&corners[2])));
+            if near(&low, &high) {
+                let before = index
+                    .checked_sub(1)
+                    .filter(|before| self.triangles[*before as usize].face == triangle.face);
+                let first = before.unwrap_or(index);
+                if !faces.contains(&first) {
+                    faces.push(first);
+                }
+            }
+            faces.len() > most
+        });
+        (faces.len() <= most).then_some(faces)
     }
 
     /// The first surface that a ray meets, nearer than `reach` lengths of its direction.
@@ -174,7 +243,7 @@ impl Occluders {
         let mut hit = None;
         self.search(
             |low, high| slabs.meet(low, high, nearest.get()),
-            |triangle| {
+            |_, triangle| {
                 if let Some(along) =
                     triangle.meet(origin, direction).filter(|along| *along > 0.0 && *along < nearest.get())
                 {
@@ -201,7 +270,7 @@ impl Occluders {
             let high = eye.sup(&start.sup(end));
             self.search(
                 |box_low, box_high| fan.may_meet(box_low, box_high, &low, &high),
-                |triangle| {
+                |_, triangle| {
                     if !(triangle.holds(start) && triangle.holds(end)) {
                         parts.extend(fan.shadow(triangle.corners()));
                     }

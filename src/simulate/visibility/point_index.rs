@@ -1,76 +1,44 @@
-//! Points in cells, so that whole cells outside a frustum are passed over.
+//! Points in a tree, so that whole boxes out of view or behind a face are passed over.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 
-use super::View;
+use super::places::PlaceSet;
+use super::shadow::{Between, Few, Shadows};
+use super::tree::{Node, Tree};
+use super::{Occluders, View};
 
-/// Points that a cell holds on average where they are spread evenly on a surface.
-const POINTS_PER_CELL: f64 = 16.0;
-
-/// A cell: its points from `begin` to `end` of the index, and the box about them.
-#[derive(Clone, Debug)]
-struct Cell {
-    low: Point3<f64>,
-    high: Point3<f64>,
-    begin: usize,
-    end: usize,
-}
-
-/// Points sorted into the cells of a grid, and the cells into blocks.
+/// Points sorted into a tree of boxes.
 #[derive(Clone, Debug, Default)]
 pub struct PointIndex {
     points: Vec<Point3<f64>>,
-    ids: Vec<u32>,
-    cells: Vec<Cell>,
-    blocks: Vec<Cell>,
+    tree: Tree,
+    /// The points of each node, for nodes so large that one set is united with another faster than points are
+    /// added to it one by one.
+    sets: Vec<Option<PlaceSet>>,
+    /// Greatest coordinate, metres.
+    reach: f64,
 }
+
+/// With more points than these (and few nodes in view) sets would only take memory.
+const MOST_IN_SETS: usize = 1 << 22;
 
 impl PointIndex {
     /// An index of points, named by their places.
     #[must_use]
     pub fn new(points: &[Point3<f64>]) -> Self {
-        let Some(first) = points.first() else { return Self::default() };
-        let (low, high) =
-            points.iter().fold((*first, *first), |(low, high), point| (low.inf(point), high.sup(point)));
-        let extent = high - low;
-        // On surfaces the number of cells that hold anything grows with the square of their number along a side.
-        let sides = (points.len() as f64 / POINTS_PER_CELL).sqrt().clamp(1.0, 256.0);
-        let size = (extent.amax() / sides).max(f64::MIN_POSITIVE);
-        let cell_of = |point: &Point3<f64>| (point - low).map(|number| clamp_to_u16(number / size));
-        let mut order: Vec<(u64, u32)> =
-            (0_u32..).zip(points).map(|(id, point)| (interleave(cell_of(point)), id)).collect();
-        order.sort_unstable();
-        let sorted: Vec<Point3<f64>> = order.iter().map(|(_, id)| points[*id as usize]).collect();
-        let bounded = |begin: usize, end: usize| {
-            let start = (sorted[begin], sorted[begin]);
-            let (low, high) =
-                sorted[begin..end].iter().fold(start, |(low, high), point| (low.inf(point), high.sup(point)));
-            Cell { low, high, begin, end }
-        };
-        let ends_of_runs = |shift: u32| {
-            let mut cells = Vec::new();
-            let mut begin = 0;
-            for run in order.chunk_by(|left, right| left.0 >> shift == right.0 >> shift) {
-                cells.push((begin, begin + run.len()));
-                begin += run.len();
-            }
-            cells
-        };
-        let cells: Vec<Cell> = ends_of_runs(0).into_iter().map(|(begin, end)| bounded(begin, end)).collect();
-        // A block is 4 × 4 × 4 cells, which stand together in the order of interleaved bits; here its
-        // `begin` and `end` are cells.
-        let mut first_cell = 0;
-        let blocks = ends_of_runs(6)
-            .into_iter()
-            .map(|(begin, end)| {
-                let block = bounded(begin, end);
-                let last = first_cell + cells[first_cell..].partition_point(|cell| cell.begin < end);
-                let block = Cell { begin: first_cell, end: last, ..block };
-                first_cell = last;
-                block
+        let boxes: Vec<_> = points.iter().map(|point| [*point, *point]).collect();
+        let tree = Tree::new(&boxes);
+        let reach = points.iter().fold(0.0, |reach: f64, point| reach.max(point.coords.amax()));
+        let large = points.len() / 64 + 64;
+        let set = |node: &Node| {
+            (node.end - node.begin >= large && points.len() <= MOST_IN_SETS).then(|| {
+                let mut set = PlaceSet::new(points.len());
+                tree.order[node.begin..node.end].iter().for_each(|id| set.insert(*id));
+                set
             })
-            .collect();
-        Self { points: sorted, ids: order.into_iter().map(|(_, id)| id).collect(), cells, blocks }
+        };
+        let sets = tree.nodes.iter().map(set).collect();
+        Self { points: tree.order.iter().map(|id| points[*id as usize]).collect(), tree, sets, reach }
     }
 
     /// Number of points.
@@ -85,69 +53,148 @@ impl PointIndex {
         self.points.is_empty()
     }
 
-    /// Names of the points in the frustum of a view that pass a further test, ascending.
-    pub fn in_view(&self, view: &View, mut passes: impl FnMut(&Point3<f64>) -> bool) -> Vec<u32> {
-        let mut found = Vec::new();
-        for block in &self.blocks {
-            let Some(inside) = view.classify(&block.low, &block.high) else { continue };
-            for cell in &self.cells[block.begin..block.end] {
-                let inside = inside
-                    || match view.classify(&cell.low, &cell.high) {
-                        Some(inside) => inside,
-                        None => continue,
-                    };
-                for index in cell.begin..cell.end {
-                    let point = &self.points[index];
-                    if (inside || view.project(point).is_some()) && passes(point) {
-                        found.push(self.ids[index]);
-                    }
-                }
-            }
+    /// Names of the points in the frustum of a view, ascending, those that faces hide left out.
+    ///
+    /// The same as [`View::project`] and [`Occluders::hides`] say of each point.
+    ///
+    /// * `set` — an empty set with room for every point; it is empty again afterwards.
+    #[must_use]
+    pub fn seen(&self, view: &View, occluders: Option<&Occluders>, set: &mut PlaceSet) -> Vec<u32> {
+        if !self.tree.nodes.is_empty() {
+            let shadows = occluders.map(|occluders| Shadows::new(occluders, view.center(), self.reach));
+            let none = Few::default();
+            let known = if shadows.is_some() { None } else { Some(&none) };
+            let mut walk = Walk { index: self, view, shadows, set };
+            walk.node(0, false, known);
         }
-        found.sort_unstable();
-        found
+        set.drain()
     }
 }
 
-/// A cell's number along an axis.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to what fits")]
-fn clamp_to_u16(number: f64) -> u16 {
-    number.clamp(0.0, f64::from(u16::MAX)) as u16
+/// One view on its way through the tree.
+struct Walk<'a> {
+    index: &'a PointIndex,
+    view: &'a View,
+    shadows: Option<Shadows<'a>>,
+    set: &'a mut PlaceSet,
 }
 
-/// Bits of three numbers, one of each in turn: near cells come near each other.
-fn interleave(cell: Vector3<u16>) -> u64 {
-    let spread =
-        |number: u16| (0..16).fold(0_u64, |bits, bit| bits | (u64::from(number >> bit & 1) << (3 * bit)));
-    spread(cell.x) | spread(cell.y) << 1 | spread(cell.z) << 2
+impl Walk<'_> {
+    /// Adds what is seen of a node.
+    ///
+    /// * `inside` — whether the node is known to be in the frustum.
+    /// * `known` — faces of which alone some may hide anything in the node; `None` where they are too many.
+    fn node(&mut self, at: usize, inside: bool, known: Option<&Few>) {
+        let index = self.index;
+        let node = &index.tree.nodes[at];
+        let found = if inside { Some(true) } else { self.view.classify_box(&node.center, &node.half) };
+        let Some(inside) = found else { return };
+        let mark = self.shadows.as_ref().map_or(0, Shadows::mark);
+        let between = match (&mut self.shadows, known) {
+            (Some(shadows), known) if known.is_none_or(|few| !few.is_empty()) => {
+                shadows.between(&node.center, &node.half, known)
+            }
+            _ => Between::Few(Few::default()),
+        };
+        let few = match between {
+            Between::Hidden => None,
+            Between::Few(few) => Some(Some(few)),
+            Between::Many => Some(None),
+        };
+        if let Some(few) = few {
+            if inside && few.as_ref().is_some_and(Few::is_empty) {
+                match &index.sets[at] {
+                    Some(set) => self.set.unite(set),
+                    None => index.tree.order[node.begin..node.end].iter().for_each(|id| self.set.insert(*id)),
+                }
+            } else if node.exit == at + 1 {
+                self.leaf(node.begin..node.end, inside, few.as_ref());
+            } else {
+                let mut child = at + 1;
+                while child < node.exit {
+                    self.node(child, inside, few.as_ref());
+                    child = index.tree.nodes[child].exit;
+                }
+            }
+        }
+        if let Some(shadows) = &mut self.shadows {
+            shadows.forget(mark);
+        }
+    }
+
+    /// Adds the points of a leaf that are seen.
+    fn leaf(&mut self, places: std::ops::Range<usize>, inside: bool, few: Option<&Few>) {
+        for place in places {
+            let point = &self.index.points[place];
+            if !inside && self.view.project(point).is_none() {
+                continue;
+            }
+            if !self.shadows.as_ref().is_some_and(|shadows| shadows.hide(point, few)) {
+                self.set.insert(self.index.tree.order[place]);
+            }
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::view::tests::{point, view};
     use super::*;
+    use crate::simulate::scene::{Face, Scene};
+    use nalgebra::Vector3;
     use proptest::prelude::*;
 
+    /// Triangles and parallelograms, loose or many and small.
+    fn scene() -> impl Strategy<Value = Scene> {
+        let face = (any::<bool>(), prop::array::uniform3(point(3.0)), 0.05_f64..1.0);
+        prop::collection::vec(face, 0..90).prop_map(|faces| Scene {
+            faces: faces
+                .into_iter()
+                .map(|(quad, [a, b, c], size)| {
+                    let (b, c) = (a + (b - a) * size, a + (c - a) * size);
+                    let (along, up) = (b - a, c - a);
+                    if quad {
+                        Face::quad([a, b, b + up, a + up], 0)
+                    } else {
+                        Face::triangle([a, a + along, c], 0)
+                    }
+                })
+                .collect(),
+            edges: Vec::new(),
+        })
+    }
+
     proptest! {
+        #![proptest_config(ProptestConfig::with_cases(512))]
+
         #[test]
-        fn the_index_finds_the_points_that_are_in_view(
-            view in view(), mut points in prop::collection::vec(point(6.0), 0..400),
+        fn the_index_finds_the_points_that_are_in_view_and_not_hidden(
+            view in view(),
+            scene in scene(),
+            mut points in prop::collection::vec(point(6.0), 0..400),
+            on_faces in prop::collection::vec(prop::array::uniform2(0.0_f64..1.0), 0..600),
         ) {
-            // Some points at one place, and a plane.
+            // Some points at one place, a plane, and points on the faces.
             let repeated: Vec<_> = points.iter().take(3).copied().collect();
             points.extend(repeated);
             points.iter_mut().skip(100).for_each(|point| point.z = 1.0);
-            let expected: Vec<u32> = (0_u32..)
-                .zip(&points)
-                .filter(|(id, point)| id % 3 != 0 && view.project(point).is_some())
-                .map(|(id, _)| id)
-                .collect();
+            for (place, [a, b]) in on_faces.into_iter().enumerate() {
+                if let Some(face) = scene.faces.get(place / 20) {
+                    let corners = face.corners();
+                    let sides: [Vector3<f64>; 2] = [corners[1] - corners[0], corners[2] - corners[1]];
+                    points.push(corners[0] + sides[0] * a + sides[1] * (a * b));
+                }
+            }
             let index = PointIndex::new(&points);
-            let by_place = |point: &Point3<f64>| points.iter().position(|other| other == point).unwrap();
-            let found = index.in_view(&view, |_| true);
-            prop_assert_eq!(found.into_iter().filter(|id| id % 3 != 0).collect::<Vec<_>>(), expected);
-            let none = index.in_view(&view, |point| by_place(point) > points.len());
-            prop_assert!(none.is_empty());
+            let occluders = Occluders::new(&scene);
+            let mut set = PlaceSet::new(points.len());
+            let named = |test: &dyn Fn(&Point3<f64>) -> bool| -> Vec<u32> {
+                (0_u32..).zip(&points).filter(|(_, point)| test(point)).map(|(id, _)| id).collect()
+            };
+            let in_view = |point: &Point3<f64>| view.project(point).is_some();
+            prop_assert_eq!(index.seen(&view, None, &mut set), named(&in_view));
+            let seen = |point: &Point3<f64>| in_view(point) && !occluders.hides(&view.center(), point);
+            prop_assert_eq!(index.seen(&view, Some(&occluders), &mut set), named(&seen));
         }
     }
 }

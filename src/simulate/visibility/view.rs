@@ -120,12 +120,15 @@ impl View {
     /// otherwise whether it is wholly inside (said only of one that is).
     #[must_use]
     pub fn classify(&self, low: &Point3<f64>, high: &Point3<f64>) -> Option<bool> {
-        let center = nalgebra::center(low, high);
-        let half = 0.5 * (high - low);
+        self.classify_box(&nalgebra::center(low, high), &(0.5 * (high - low)))
+    }
+
+    /// As [`classify`](Self::classify), of a box given by its middle and half its size.
+    pub(super) fn classify_box(&self, center: &Point3<f64>, half: &Vector3<f64>) -> Option<bool> {
         let mut inside = true;
         for (normal, offset) in &self.planes {
             let distance = normal.dot(&center.coords) + offset;
-            let reach = normal.abs().dot(&half);
+            let reach = normal.abs().dot(half);
             // Rounding of the numbers above, generously.
             let slack = 1e-9 * (1.0 + distance.abs() + reach);
             if distance + reach < -slack {

@@ -102,9 +102,7 @@ impl RawArgs {
         let progress = Progress::new("rendering", "frames");
         let rendered =
             render(simulation, &options, partial.path(), &|done, total| progress.update(done, total))?;
-        drop(progress);
-        partial.finish()?;
-        Ok(rendered)
+        Ok((partial, rendered))
     }
 }
 

@@ -77,13 +77,13 @@ impl RawArgs {
         Ok(Some(folder))
     }
 
-    /// Renders into the folder, which has its name only when it is whole.
+    /// Renders into the folder, which gets its name when it is finished.
     pub(super) fn render(
         &self,
         simulation: &Simulation,
         folder: &Path,
         force: bool,
-    ) -> anyhow::Result<Rendered> {
+    ) -> anyhow::Result<(Partial, Rendered)> {
         let Some(dataset) = self.render else { anyhow::bail!("--render-to needs --render") };
         let layout = match dataset {
             Dataset::Tum => Layout::Tum,
@@ -102,9 +102,7 @@ impl RawArgs {
         let progress = Progress::new("rendering", "frames");
         let rendered =
             render(simulation, &options, partial.path(), &|done, total| progress.update(done, total))?;
-        drop(progress);
-        partial.finish()?;
-        Ok(rendered)
+        Ok((partial, rendered))
     }
 }
 

@@ -72,6 +72,8 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     let simulation = simulate::simulate(&recipe, &folder, &|_, done, total| progress.update(done, total))
         .with_context(|| format!("recipe {name}"))?;
     drop(progress);
+    // First, for what cannot be rendered leaves no sequence either.
+    let rendered = raw.map(|raw| args.render.render(&simulation, raw, args.force)).transpose()?;
     let options = WriteOptions { force: args.force, foxglove: args.foxglove, ..WriteOptions::default() };
     let written = write(&simulation, output, options)?;
 
@@ -90,8 +92,8 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         text::count(rows),
         text::bytes(text::size_on_disk(output))
     )?;
-    if let Some(raw) = raw {
-        let rendered = args.render.render(&simulation, raw, args.force)?;
+    if let Some((raw, (partial, rendered))) = raw.zip(rendered) {
+        partial.finish()?;
         let (width, height) = (rendered.width, rendered.height);
         let (frames, size) = (text::count(rendered.frames as u64), text::bytes(text::size_on_disk(raw)));
         writeln!(

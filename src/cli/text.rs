@@ -56,7 +56,14 @@ pub(super) fn bytes(number: u64) -> String {
 pub(super) fn size_on_disk(path: &Path) -> u64 {
     let size = |path: &Path| fs::metadata(path).map_or(0, |found| found.len());
     match fs::read_dir(path) {
-        Ok(entries) => entries.flatten().map(|entry| size(&entry.path())).sum(),
+        Ok(entries) => entries
+            .flatten()
+            .map(|entry| {
+                // A link to a folder is not followed.
+                let is_folder = entry.file_type().is_ok_and(|kind| kind.is_dir());
+                if is_folder { size_on_disk(&entry.path()) } else { size(&entry.path()) }
+            })
+            .sum(),
         Err(_) => size(path),
     }
 }

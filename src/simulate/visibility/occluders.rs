@@ -204,7 +204,8 @@ impl Occluders {
         // Lines of sight stay in the box about eye and target, and within the target's radius of the axis.
         let (low, high) = (eye.inf(&(center - half)), eye.sup(&(center + half)));
         let (axis, radius) = (center - eye, half.norm());
-        let scale = axis.norm_squared().recip();
+        // A target about the eye has no axis.
+        let scale = Some(axis.norm_squared().recip()).filter(|scale| scale.is_finite()).unwrap_or(0.0);
         let slack = 1e-9 * (1.0 + low.coords.amax().max(high.coords.amax()));
         let near = |box_low: &Point3<f64>, box_high: &Point3<f64>| {
             if (0..3).any(|axis| box_low[axis] > high[axis] + slack || box_high[axis] < low[axis] - slack) {
@@ -213,8 +214,7 @@ impl Occluders {
             let reach = 0.5 * (box_high - box_low).norm() + radius + slack;
             let from_eye = nalgebra::center(box_low, box_high) - eye;
             let part = (from_eye.dot(&axis) * scale).clamp(0.0, 1.0);
-            // A target about the eye has no axis; the NaN of its part passes.
-            !((from_eye - axis * part).norm_squared() > reach * reach)
+            (from_eye - axis * part).norm_squared() <= reach * reach
         };
         let mut faces: Vec<u32> = Vec::new();
         self.search(near, |index, triangle| {

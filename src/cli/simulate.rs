@@ -98,7 +98,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         let (frames, size) = (text::count(rendered.frames as u64), text::bytes(text::size_on_disk(raw)));
         writeln!(
             stdout,
-            "{}: {frames} pictures and depth maps of {width} x {height} px, {size}",
+            "{}: pictures and depth maps of {frames} frames, {width} x {height} px, {size}",
             raw.display()
         )?;
     }

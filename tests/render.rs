@@ -57,7 +57,7 @@ fn a_dataset_stands_beside_the_sequence_and_is_replaced_only_by_force() {
     let more = ["--render-stride", "4"];
     let output = os(folder.path(), &arguments).args(more).assert().success();
     let text = String::from_utf8(output.get_output().stdout.clone()).unwrap();
-    assert!(text.contains("raw: 3 pictures and depth maps of 48 x 36 px"), "{text}");
+    assert!(text.contains("raw: pictures and depth maps of 3 frames, 48 x 36 px"), "{text}");
     assert_eq!(names(folder.path()), ["a.mcap", "one-box.toml", "raw"]);
     let raw = folder.path().join("raw");
     assert_eq!(names(&raw), ["calibration.txt", "depth_left", "image_left", "pose_left.txt"]);

@@ -150,9 +150,6 @@ fn refuse_existing(output: &Path, force: bool) -> anyhow::Result<()> {
 /// A recipe, and the folder in which names of files in it start.
 fn recipe_of(name: &str) -> anyhow::Result<(Recipe, PathBuf)> {
     let path = Path::new(name);
-    if simulate::names().contains(&name) && !path.exists() {
-        return Ok((simulate::named(name)?, PathBuf::new()));
-    }
     if path.is_dir() || (!path.exists() && path.extension().is_none()) {
         // A name of ours goes before a folder of that name, such as an output that stands beside.
         return Ok((simulate::named(name)?, PathBuf::new()));

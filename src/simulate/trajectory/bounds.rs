@@ -36,6 +36,13 @@ pub(super) fn angle(place: &str, value: f64) -> Result<(), Error> {
     within(place, value, -3600.0, 3600.0)
 }
 
+/// The angles by which a camera is turned on its path, degrees.
+pub(super) fn camera_angles(yaw: f64, pitch: f64, roll: f64) -> Result<(), Error> {
+    angle("trajectory.yaw_deg", yaw)?;
+    angle("trajectory.pitch_deg", pitch)?;
+    angle("trajectory.roll_deg", roll)
+}
+
 /// A whole number from `low` to `high`.
 pub(super) fn count(place: &str, value: u64, low: u64, high: u64) -> Result<(), Error> {
     if (low..=high).contains(&value) {

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
 
 use super::attitude::Mount;
-use super::bounds::{angle, count, length, point};
+use super::bounds::{camera_angles, count, length, point};
 use super::path::Path;
 use crate::geometry::Pose;
 use crate::simulate::Error;
@@ -69,9 +69,7 @@ impl Path for Corridor {
         self.half_leg_m.into_iter().try_for_each(|half| length("trajectory.half_leg_m", half))?;
         length("trajectory.corner_radius_m", self.corner_radius_m)?;
         count("trajectory.pieces", self.pieces, 1, 1_000_000)?;
-        angle("trajectory.yaw_deg", self.yaw_deg)?;
-        angle("trajectory.pitch_deg", self.pitch_deg)?;
-        angle("trajectory.roll_deg", self.roll_deg)
+        camera_angles(self.yaw_deg, self.pitch_deg, self.roll_deg)
     }
 
     fn fewest(&self) -> usize {

@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 
 use super::arc_length::{ArcLength, Curve};
 use super::attitude::Mount;
-use super::bounds::{angle, coordinate, count, length, point};
+use super::bounds::{camera_angles, coordinate, count, length, point};
 use super::look::Look;
 use super::path::Path;
 use crate::geometry::Pose;
@@ -94,9 +94,7 @@ impl Path for FigureEight {
         coordinate("trajectory.rise_m", self.rise_m)?;
         count("trajectory.laps", self.laps, 1, 1_000_000)?;
         self.look.check()?;
-        angle("trajectory.yaw_deg", self.yaw_deg)?;
-        angle("trajectory.pitch_deg", self.pitch_deg)?;
-        angle("trajectory.roll_deg", self.roll_deg)
+        camera_angles(self.yaw_deg, self.pitch_deg, self.roll_deg)
     }
 
     fn fewest(&self) -> usize {

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 use super::attitude::Mount;
-use super::bounds::{angle, length, point, within};
+use super::bounds::{camera_angles, length, point, within};
 use super::path::Path;
 use crate::geometry::Pose;
 use crate::simulate::Error;
@@ -66,9 +66,7 @@ impl Path for Sphere {
         point("trajectory.centre_m", self.centre_m)?;
         length("trajectory.radius_m", self.radius_m)?;
         self.turns.map_or(Ok(()), |turns| within("trajectory.turns", turns, -10_000.0, 10_000.0))?;
-        angle("trajectory.yaw_deg", self.yaw_deg)?;
-        angle("trajectory.pitch_deg", self.pitch_deg)?;
-        angle("trajectory.roll_deg", self.roll_deg)
+        camera_angles(self.yaw_deg, self.pitch_deg, self.roll_deg)
     }
 
     fn fewest(&self) -> usize {

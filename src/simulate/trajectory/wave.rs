@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::attitude::Mount;
-use super::bounds::{angle, coordinate, count, length, point};
+use super::bounds::{camera_angles, coordinate, count, length, point};
 use super::path::Path;
 use crate::geometry::Pose;
 use crate::simulate::Error;
@@ -72,9 +72,7 @@ impl Path for Wave {
         coordinate("trajectory.amplitude_m", self.amplitude_m)?;
         count("trajectory.waves", self.waves, 1, 1_000_000)?;
         super::bounds::within("trajectory.turns", self.turns, -10_000.0, 10_000.0)?;
-        angle("trajectory.yaw_deg", self.yaw_deg)?;
-        angle("trajectory.pitch_deg", self.pitch_deg)?;
-        angle("trajectory.roll_deg", self.roll_deg)
+        camera_angles(self.yaw_deg, self.pitch_deg, self.roll_deg)
     }
 
     fn fewest(&self) -> usize {

@@ -7,7 +7,7 @@ use std::f64::consts::{PI, TAU};
 
 use super::arc_length::{ArcLength, Curve};
 use super::attitude::Mount;
-use super::bounds::{angle, point};
+use super::bounds::{angle, camera_angles, point};
 use super::cubic_spline::CubicSpline;
 use super::look::{Look, WaypointLook};
 use super::path::Path;
@@ -115,9 +115,7 @@ impl Path for Waypoints {
         if let WaypointLook::Target(target) = self.look {
             Look::Target(target).check()?;
         }
-        angle("trajectory.yaw_deg", self.yaw_deg)?;
-        angle("trajectory.pitch_deg", self.pitch_deg)?;
-        angle("trajectory.roll_deg", self.roll_deg)
+        camera_angles(self.yaw_deg, self.pitch_deg, self.roll_deg)
     }
 
     fn fewest(&self) -> usize {

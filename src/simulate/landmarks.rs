@@ -258,6 +258,11 @@ impl<'a> LineSource<'a> {
     }
 }
 
+/// A cell of a grid and the 26 that touch it.
+pub(super) fn cells_about([x, y, z]: [i64; 3]) -> impl Iterator<Item = [i64; 3]> {
+    (0..27_i64).map(move |step| [x + step % 3 - 1, y + step / 3 % 3 - 1, z + step / 9 - 1])
+}
+
 /// Directions without sign, each once.
 #[derive(Default)]
 struct Families {
@@ -275,9 +280,7 @@ impl Families {
             std::array::from_fn(|axis| (direction[axis] * STEPS).round() as i64)
         };
         for signed in [direction, -direction] {
-            let [x, y, z] = bucket(&signed);
-            for step in 0..27_i64 {
-                let near = [x + step % 3 - 1, y + step / 3 % 3 - 1, z + step / 9 - 1];
+            for near in cells_about(bucket(&signed)) {
                 for family in self.buckets.get(&near).into_iter().flatten() {
                     if self.list[*family as usize].direction.cross(&direction).norm() < SAME_DIRECTION {
                         return *family;

@@ -10,7 +10,7 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 
-use super::landmarks::{DrawnLine, LineSource, PointSource};
+use super::landmarks::{DrawnLine, LineSource, PointSource, cells_about};
 use super::scene::Scene;
 use super::survey::{SeenLine, Survey};
 use super::visibility::{Occluders, Places, View};
@@ -311,8 +311,7 @@ impl Apart {
             [ends[0].min(ends[1]), ends[0].max(ends[1])]
         };
         let length = (segment.end - segment.start).norm();
-        for step in 0..27_i64 {
-            let near = [cell[0] + step % 3 - 1, cell[1] + step / 3 % 3 - 1, cell[2] + step / 9 - 1];
+        for near in cells_about(cell) {
             for other in self.lines.get(&(family, near)).into_iter().flatten() {
                 let [low, high] = along(other);
                 let aside = (other.start - segment.start).cross(&direction).norm();

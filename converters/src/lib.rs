@@ -3,4 +3,5 @@
 pub mod command;
 pub mod family;
 pub mod release;
+pub mod rgbd;
 pub mod text_release;

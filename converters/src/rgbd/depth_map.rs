@@ -1,0 +1,303 @@
+//! Depth of every pixel of an image.
+
+use nalgebra::{Matrix3, Point2, Vector3};
+
+use super::DepthNoise;
+
+/// Standard deviations between a depth and a surface that is still the same.
+const SIGMAS: f64 = 3.0;
+/// How far a smooth surface may be from a plane within a pixel, in widths of a pixel at its depth.
+const BEND: f64 = 0.5;
+/// A step in depth between neighbouring pixels that no surface has which is seen as such, in widths of a pixel.
+const JUMP: f64 = 3.0;
+/// How far a surface may be from where its landmark lies, in widths of a pixel.
+const NEAR: f64 = 1.0;
+
+/// Depth along the optical axis of every pixel of an image, metres.
+#[derive(Clone, Debug)]
+pub struct DepthMap {
+    width: usize,
+    height: usize,
+    /// Row by row; NaN where there is none.
+    depth_m: Vec<f32>,
+}
+
+/// What a depth map says about a place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Surface {
+    /// Depth of the nearest surface, metres.
+    pub depth_m: f64,
+    /// Whether another surface begins behind it within a pixel.
+    pub jump: bool,
+}
+
+/// Whether a depth map shows a point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sight {
+    /// The surface is where the point is.
+    Seen,
+    /// The surface is nearer.
+    Hidden,
+    /// The surface is farther: nothing is where the point should be.
+    Absent,
+    /// There is no depth.
+    Unknown,
+}
+
+impl DepthMap {
+    /// A depth map; depths that are not finite and positive count as absent.
+    ///
+    /// * `depth_m` — row by row, metres.
+    ///
+    /// `None` where the numbers do not fill the image.
+    #[must_use]
+    pub fn new(width: u32, height: u32, mut depth_m: Vec<f32>) -> Option<Self> {
+        let (width, height) = (width as usize, height as usize);
+        if width == 0 || height == 0 || width.checked_mul(height)? != depth_m.len() {
+            return None;
+        }
+        for depth in &mut depth_m {
+            if !(*depth > 0.0 && depth.is_finite()) {
+                *depth = f32::NAN;
+            }
+        }
+        Some(Self { width, height, depth_m })
+    }
+
+    /// Columns and rows.
+    #[must_use]
+    pub fn size(&self) -> [usize; 2] {
+        [self.width, self.height]
+    }
+
+    /// Depth of a pixel, metres; `None` where there is none, or outside.
+    #[must_use]
+    pub fn at(&self, column: i64, row: i64) -> Option<f64> {
+        let column = usize::try_from(column).ok().filter(|column| *column < self.width)?;
+        let row = usize::try_from(row).ok().filter(|row| *row < self.height)?;
+        let depth = self.depth_m[row * self.width + column];
+        (!depth.is_nan()).then(|| f64::from(depth))
+    }
+
+    /// Takes away depths outside a range, metres.
+    pub fn limit(&mut self, nearest_m: f64, farthest_m: f64) {
+        for depth in &mut self.depth_m {
+            if !(nearest_m..=farthest_m).contains(&f64::from(*depth)) {
+                *depth = f32::NAN;
+            }
+        }
+    }
+
+    /// Part of the pixels that have a depth.
+    #[must_use]
+    pub fn coverage(&self) -> f64 {
+        self.depth_m.iter().filter(|depth| !depth.is_nan()).count() as f64 / self.depth_m.len() as f64
+    }
+
+    /// The nearest surface at a place between pixels.
+    ///
+    /// A plane has an inverse depth that is linear in the image, so a plane is fitted to the inverse depths of the nine
+    /// pixels around. Where they do not lie on one, they are parted at the widest gap between their depths, and the nearer
+    /// part counts: at the rim of an object a feature belongs to the object. Narrow gaps are creases, not rims.
+    ///
+    /// * `raster` — raster position.
+    /// * `focal_px` — focal length, pixels: says how wide a pixel is at a depth.
+    ///
+    /// `None` without a depth at the nearest pixel, with fewer than six around, or outside the image.
+    #[must_use]
+    pub fn surface(&self, raster: Point2<f64>, focal_px: f64, noise: &DepthNoise) -> Option<Surface> {
+        let (column, row) = nearest(raster)?;
+        let middle = self.at(column, row)?;
+        let mut near: Vec<(f64, [f64; 2])> = Vec::with_capacity(9);
+        for neighbour_row in row - 1..=row + 1 {
+            for neighbour_column in column - 1..=column + 1 {
+                if let Some(depth) = self.at(neighbour_column, neighbour_row) {
+                    let offset = [neighbour_column as f64 - raster.x, neighbour_row as f64 - raster.y];
+                    near.push((depth, offset));
+                }
+            }
+        }
+        if near.len() < 6 {
+            return None;
+        }
+        let tolerance =
+            |depth_m: f64, widths: f64| SIGMAS * noise.sigma_m(depth_m) + widths * depth_m / focal_px;
+        if let Some((inverse, worst)) = plane(&near)
+            && worst * middle * middle <= tolerance(middle, BEND)
+        {
+            return Some(Surface { depth_m: 1.0 / inverse, jump: false });
+        }
+        near.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let gaps = near.windows(2).map(|pair| pair[1].0 - pair[0].0);
+        let (before, gap) = (1..).zip(gaps).max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let jump = gap > tolerance(near[before - 1].0, JUMP);
+        let part = if jump { &near[..before] } else { &near[..] };
+        if part.len() < 3 {
+            return None;
+        }
+        // Near pixels count most; the one at the place itself all but alone.
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for (depth, [x, y]) in part {
+            let weight = 1.0 / (x * x + y * y + 1e-3);
+            sum += weight / depth;
+            weights += weight;
+        }
+        Some(Surface { depth_m: weights / sum, jump })
+    }
+
+    /// Whether the map shows a point.
+    ///
+    /// * `raster` — where the point appears; `depth_m` — its depth, metres.
+    /// * `reach` — how many pixels around are asked: 1 asks the four around the place, more a square of that half width.
+    #[must_use]
+    pub fn sight(
+        &self,
+        raster: Point2<f64>,
+        depth_m: f64,
+        focal_px: f64,
+        noise: &DepthNoise,
+        reach: i64,
+    ) -> Sight {
+        let tolerance = SIGMAS * noise.sigma_m(depth_m) + NEAR * depth_m / focal_px;
+        let (columns, rows) = if reach <= 1 {
+            let (column, row) = (floor(raster.x), floor(raster.y));
+            (column..=column + 1, row..=row + 1)
+        } else {
+            let Some((column, row)) = nearest(raster) else { return Sight::Unknown };
+            (column - reach + 1..=column + reach - 1, row - reach + 1..=row + reach - 1)
+        };
+        let (mut known, mut nearer) = (0, 0);
+        let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
+        for row in rows {
+            for column in columns.clone() {
+                let Some(found) = self.at(column, row) else { continue };
+                if (found - depth_m).abs() <= tolerance {
+                    return Sight::Seen;
+                }
+                known += 1;
+                nearer += i32::from(found < depth_m);
+                least = least.min(found);
+                most = most.max(found);
+            }
+        }
+        if known == 0 {
+            return Sight::Unknown;
+        }
+        // Between depths of a steep surface, which a rim does not have.
+        if known >= 4 && least < depth_m && depth_m < most {
+            if let Some(surface) = self.surface(raster, focal_px, noise)
+                && (surface.depth_m - depth_m).abs() <= tolerance
+            {
+                return Sight::Seen;
+            }
+            return Sight::Hidden;
+        }
+        if nearer > 0 { Sight::Hidden } else { Sight::Absent }
+    }
+}
+
+/// The pixel that a place lies on.
+fn nearest(raster: Point2<f64>) -> Option<(i64, i64)> {
+    let finite = raster.x.is_finite() && raster.y.is_finite();
+    finite.then(|| (floor(raster.x + 0.5), floor(raster.y + 0.5)))
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "what is far outside saturates, and is outside as well")]
+fn floor(value: f64) -> i64 {
+    // Half of the range leaves room for neighbours.
+    (value.floor() as i64).clamp(i64::MIN / 2, i64::MAX / 2)
+}
+
+/// Least-squares plane through inverse depths: its value at the origin, and the largest distance from it.
+fn plane(near: &[(f64, [f64; 2])]) -> Option<(f64, f64)> {
+    let mut normal = Matrix3::zeros();
+    let mut right = Vector3::zeros();
+    for (depth, [x, y]) in near {
+        let row = Vector3::new(1.0, *x, *y);
+        normal += row * row.transpose();
+        right += row / *depth;
+    }
+    let solution = normal.cholesky()?.solve(&right);
+    let worst = near
+        .iter()
+        .map(|(depth, [x, y])| (solution.dot(&Vector3::new(1.0, *x, *y)) - 1.0 / depth).abs())
+        .fold(0.0, f64::max);
+    (solution.x > 0.0).then_some((solution.x, worst))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FOCAL_PX: f64 = 100.0;
+    const EXACT: DepthNoise = DepthNoise { constant_m: 1e-4, linear: 0.0, quadratic_per_m: 0.0 };
+
+    /// A map of a function of column and row.
+    fn map(depth: impl Fn(f64, f64) -> f64) -> DepthMap {
+        let cells = (0..400).map(|cell| depth(f64::from(cell % 20), f64::from(cell / 20)) as f32);
+        DepthMap::new(20, 20, cells.collect()).unwrap()
+    }
+
+    #[test]
+    fn a_slanted_plane_is_met_between_pixels() {
+        let inverse = |u: f64, v: f64| 0.3 + 0.01 * u - 0.004 * v;
+        let map = map(|u, v| 1.0 / inverse(u, v));
+        for (u, v) in [(5.0, 5.0), (5.49, 5.51), (10.3, 7.8), (3.5, 12.5)] {
+            let surface = map.surface(Point2::new(u, v), FOCAL_PX, &EXACT).unwrap();
+            assert!(!surface.jump);
+            // The map's numbers have 24 binary digits.
+            assert!((surface.depth_m * inverse(u, v) - 1.0).abs() < 1e-6, "{surface:?}");
+            let sight = |depth| map.sight(Point2::new(u, v), depth, FOCAL_PX, &EXACT, 1);
+            assert_eq!(sight(surface.depth_m), Sight::Seen);
+            assert_eq!(sight(surface.depth_m * 1.3), Sight::Hidden);
+            assert_eq!(sight(surface.depth_m * 0.7), Sight::Absent);
+        }
+    }
+
+    #[test]
+    fn at_a_rim_the_nearer_surface_counts_and_both_are_seen() {
+        let map = map(|u, _| if u < 10.0 { 1.0 } else { 4.0 });
+        for u in [9.2, 9.4, 9.6, 10.4] {
+            let raster = Point2::new(u, 8.0);
+            let surface = map.surface(raster, FOCAL_PX, &EXACT).unwrap();
+            assert!(surface.jump && (surface.depth_m - 1.0).abs() < 1e-9, "{u} {surface:?}");
+        }
+        let raster = Point2::new(9.5, 8.0);
+        let sight = |depth| map.sight(raster, depth, FOCAL_PX, &EXACT, 1);
+        assert_eq!(
+            [sight(1.0), sight(4.0), sight(2.0), sight(5.0), sight(0.5)],
+            [Sight::Seen, Sight::Seen, Sight::Hidden, Sight::Hidden, Sight::Absent]
+        );
+        assert_eq!(map.sight(Point2::new(5.0, 8.0), 4.0, FOCAL_PX, &EXACT, 1), Sight::Hidden);
+        assert!(!map.surface(Point2::new(5.0, 8.0), FOCAL_PX, &EXACT).unwrap().jump);
+    }
+
+    #[test]
+    fn a_crease_is_no_rim() {
+        // Two walls at 45 degrees that meet.
+        let map = map(|u, _| 2.0 - 0.02 * (u - 10.0).abs());
+        let surface = map.surface(Point2::new(10.0, 8.0), FOCAL_PX, &EXACT).unwrap();
+        assert!(!surface.jump);
+        assert!((surface.depth_m - 2.0).abs() < 0.02, "{surface:?}");
+    }
+
+    #[test]
+    fn holes_and_what_is_outside_are_unknown() {
+        let map = map(|u, v| if (u - 10.0).abs() < 2.0 && (v - 10.0).abs() < 2.0 { 0.0 } else { 2.0 });
+        assert_eq!(map.surface(Point2::new(10.0, 10.0), FOCAL_PX, &EXACT), None);
+        for raster in [[10.0, 10.0], [-3.0, 5.0], [1e300, 5.0], [f64::NAN, 5.0], [f64::INFINITY, 0.0]] {
+            let raster = Point2::from(raster);
+            assert_eq!(map.surface(raster, FOCAL_PX, &EXACT), None);
+            assert_eq!(map.sight(raster, 2.0, FOCAL_PX, &EXACT, 2), Sight::Unknown);
+        }
+        assert!((map.coverage() - (1.0 - 9.0 / 400.0)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn numbers_that_do_not_fill_the_image_are_refused() {
+        assert!(DepthMap::new(3, 2, vec![1.0; 5]).is_none());
+        assert!(DepthMap::new(0, 0, vec![]).is_none());
+        let map = DepthMap::new(2, 1, vec![f32::INFINITY, -1.0]).unwrap();
+        assert_eq!([map.at(0, 0), map.at(1, 0)], [None; 2]);
+    }
+}

@@ -9,9 +9,11 @@ use anyhow::Context;
 use clap::builder::PossibleValuesParser;
 use rayon::prelude::*;
 
-use super::two_pass::{Chunk, Realisation, write_realisations};
+use super::progress::Stages;
 use super::{Outcome, left_behind, text};
-use crate::format::{self, SequenceReader, SequenceWriter, WriteOptions};
+use crate::format::{
+    self, Chunk, Realisation, SequenceReader, SequenceWriter, WriteOptions, write_realisations,
+};
 use crate::simulate::noise::{NoiseModel, NoiseRecipe};
 use crate::structure::{
     FrameBundle, GraphFactor, GraphLine, GraphPoint, GraphPose, LineLandmark, LineMeasurement,
@@ -173,7 +175,12 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     }
     let mut realisations = begin(args, &recipe, &reader, &outputs)?;
     let seeds: Vec<u64> = outputs.iter().map(|(seed, _)| *seed).collect();
-    write_realisations(&mut realisations, frames.len(), || chunks(&reader, &recipe, &seeds))?;
+    let stages = Stages::default();
+    let make = || chunks(&reader, &recipe, &seeds);
+    write_realisations(&mut realisations, frames.len(), make, &|stage, done, total| {
+        stages.update(stage, done, total);
+    })?;
+    drop(stages);
     for (realisation, (_, path)) in realisations.into_iter().zip(&outputs) {
         let [points, lines] = realisation.tally.measurements();
         let lost = realisation.tally.lost_depths();

@@ -17,7 +17,6 @@ mod schema;
 mod simulate;
 mod stats;
 mod text;
-mod two_pass;
 mod validate;
 
 use std::io::{self, IsTerminal, Write};

@@ -53,3 +53,22 @@ impl Drop for Progress {
         }
     }
 }
+
+/// Work on frames in stages, one after the other, each with a bar of its own.
+#[derive(Default)]
+pub(super) struct Stages {
+    stage: Mutex<Option<(&'static str, Progress)>>,
+}
+
+impl Stages {
+    /// Tells how far a stage is; one that is new ends the one before.
+    pub(super) fn update(&self, stage: &'static str, done: u64, total: u64) {
+        let Ok(mut current) = self.stage.lock() else { return };
+        if current.as_ref().is_none_or(|(name, _)| *name != stage) {
+            *current = Some((stage, Progress::new(stage, "frames")));
+        }
+        if let Some((_, progress)) = current.as_ref() {
+            progress.update(done, total);
+        }
+    }
+}

@@ -6,10 +6,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 
-use super::progress::Progress;
-use super::two_pass::write_two_pass;
+use super::progress::{Progress, Stages};
 use super::{Outcome, render, text};
-use crate::format::{Encoding, WriteOptions};
+use crate::format::{Encoding, Outline, WriteOptions, Written, write_two_pass};
 use crate::simulate::{self, Expected, MAX_RECIPE_BYTES, Recipe, Simulation};
 
 /// Simulate a sequence: a scene, a path through it, what each frame sees, and noise.
@@ -118,17 +117,16 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
 }
 
 /// Writes a simulated sequence.
-fn write(
-    simulation: &Simulation,
-    output: &Path,
-    options: WriteOptions,
-) -> anyhow::Result<crate::format::Written> {
+fn write(simulation: &Simulation, output: &Path, options: WriteOptions) -> anyhow::Result<Written> {
+    let stages = Stages::default();
     write_two_pass(
         output,
-        &simulation.manifest(),
-        simulation.frames(),
+        Outline {
+            manifest: &simulation.manifest(),
+            frames: simulation.frames(),
+            groups: simulation.structural_groups(),
+        },
         options,
-        simulation.structural_groups(),
         |writer| {
             writer.append(&simulation.point_landmarks())?;
             writer.append(&simulation.line_landmarks()?)?;
@@ -136,6 +134,7 @@ fn write(
             Ok(())
         },
         || Ok(simulation.bundles().map(Ok)),
+        &|stage, done, total| stages.update(stage, done, total),
     )
 }
 

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use crate::structure::FrameId;
+
 /// Errors of this room. Each says where, what was expected and what was found.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -65,6 +67,14 @@ pub enum Error {
         found: u64,
         /// Permitted size.
         limit: u64,
+    },
+    /// A landmark is measured in a frame that does not observe it.
+    #[error("{frame_id}: {landmark} is measured without being observed")]
+    Unobserved {
+        /// The frame.
+        frame_id: FrameId,
+        /// The landmark.
+        landmark: String,
     },
     /// A column that every row needs is missing.
     #[error("{table}: column {column} is missing; expected {expected}")]

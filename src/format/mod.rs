@@ -32,6 +32,7 @@ mod parquet_writer;
 mod partial;
 mod reader;
 mod stored_table;
+mod two_pass;
 mod writer;
 
 pub use arrow_schema::arrow_schema;
@@ -46,4 +47,5 @@ pub(crate) use partial::Partial;
 pub use partial::discard_unfinished;
 pub use reader::{SequenceReader, open, read};
 pub use stored_table::StoredTable;
+pub use two_pass::{Chunk, Outline, Realisation, Tally, write_realisations, write_two_pass};
 pub use writer::{FrameRows, SequenceWriter, WriteOptions, Written, write};

@@ -10,8 +10,7 @@ use std::thread;
 
 use rayon::prelude::*;
 
-use super::progress::Progress;
-use crate::format::{FrameRows, SequenceWriter, WriteOptions, Written};
+use super::{Error, FrameRows, SequenceWriter, WriteOptions, Written};
 use crate::structure::{
     Camera, Frame, FrameBundle, FrameCounter, FrameStatistics, KeptRows, LandmarkRows, LineCorrespondence,
     LineId, LineMeasurement, LineObservation, Manifest, PointCorrespondence, PointId, PointMeasurement,
@@ -25,53 +24,64 @@ const PIECE_ROWS: u64 = 1 << 20;
 const WAITING: usize = 4;
 
 /// The next frames of every output: a list for each.
-pub(super) type Chunk = Vec<Vec<FrameBundle>>;
+pub type Chunk = Vec<Vec<FrameBundle>>;
+
+/// What a sequence is known by before its frames are made.
+#[derive(Clone, Copy, Debug)]
+pub struct Outline<'a> {
+    /// The manifest; one that declares noise makes measurements expected, which saves a pass.
+    pub manifest: &'a Manifest,
+    /// The frames, for the index of the file.
+    pub frames: &'a [Frame],
+    /// The structural groups, for the statistics; whoever writes the sequence writes them too.
+    pub groups: &'a [StructuralGroup],
+}
 
 /// Writes a sequence, its frames made twice by `make`: with correspondences, statistics and frames.
 ///
-/// * `manifest`, `frames`, `options` — as for [`SequenceWriter::create`]; a manifest that declares noise makes
-///   measurements expected, which saves a pass.
-/// * `groups` — the structural groups, for the statistics; `whole` writes them.
+/// * `options` — as for [`SequenceWriter::create`].
 /// * `whole` — writes the other tables of the whole sequence: landmarks, groups, estimates; called once.
 /// * `make` — gives the frames in the order of the table `frames`, the same at every call, in a thread of its
 ///   own. Measured landmarks are among the observed ones, and rows are in key order.
+/// * `progress` — told the stage, how many frames are done, and of how many.
 ///
 /// Nothing is left behind where anything fails.
-pub(super) fn write_two_pass<I>(
+pub fn write_two_pass<E, I>(
     output: &Path,
-    manifest: &Manifest,
-    frames: &[Frame],
+    outline: Outline<'_>,
     options: WriteOptions,
-    groups: &[StructuralGroup],
-    whole: impl FnOnce(&mut SequenceWriter) -> anyhow::Result<()>,
-    make: impl Fn() -> anyhow::Result<I> + Sync,
-) -> anyhow::Result<Written>
+    whole: impl FnOnce(&mut SequenceWriter) -> Result<(), E>,
+    make: impl Fn() -> Result<I, E> + Sync,
+    progress: &(dyn Fn(&'static str, u64, u64) + Sync),
+) -> Result<Written, E>
 where
-    I: Iterator<Item = anyhow::Result<FrameBundle>>,
+    E: From<Error> + Send,
+    I: Iterator<Item = Result<FrameBundle, E>>,
 {
+    let Outline { manifest, frames, groups } = outline;
     let mut writer = SequenceWriter::create(output, manifest, frames, options)?;
     whole(&mut writer)?;
-    let mut outputs = vec![Realisation::new(writer, manifest, groups)];
-    write_realisations(&mut outputs, frames.len(), || {
-        Ok(make()?.map(|bundle| bundle.map(|bundle| vec![vec![bundle]])))
-    })?;
-    let output = outputs.pop().ok_or_else(|| anyhow::anyhow!("no output"))?;
+    let mut outputs = [Realisation::new(writer, manifest, groups)];
+    let make = || Ok(make()?.map(|bundle| bundle.map(|bundle| vec![vec![bundle]])));
+    write_realisations(&mut outputs, frames.len(), make, progress)?;
+    let [output] = outputs;
     Ok(output.writer.finish()?)
 }
 
 /// As [`write_two_pass`], for several outputs with the same observations, of which `make` gives the frames in
 /// chunks; what remains is to finish their writers.
-pub(super) fn write_realisations<I>(
+pub fn write_realisations<E, I>(
     outputs: &mut [Realisation],
     frame_count: usize,
-    make: impl Fn() -> anyhow::Result<I> + Sync,
-) -> anyhow::Result<()>
+    make: impl Fn() -> Result<I, E> + Sync,
+    progress: &(dyn Fn(&'static str, u64, u64) + Sync),
+) -> Result<(), E>
 where
-    I: Iterator<Item = anyhow::Result<Chunk>>,
+    E: From<Error> + Send,
+    I: Iterator<Item = Result<Chunk, E>>,
 {
     let total = frame_count as u64;
     let observed = loop {
-        let progress = Progress::new("counting", "frames");
         let (mut observed, mut done) = (Observed::default(), 0);
         for_each_chunk(&make, |chunk| {
             let first = chunk.first().map_or(&[][..], Vec::as_slice);
@@ -80,7 +90,7 @@ where
             outputs.par_iter_mut().zip(chunk).try_for_each(|(output, bundles)| {
                 bundles.into_iter().try_for_each(|bundle| output.tally.add(bundle))
             })?;
-            progress.update(done, total);
+            progress("counting", done, total);
             Ok(())
         })?;
         // Statistics of measurements that did not come are made again, of observations.
@@ -91,7 +101,7 @@ where
     };
     outputs.par_iter_mut().try_for_each(|output| output.tally.write(&observed, &mut output.writer))?;
     drop(observed);
-    let (progress, mut done) = (Progress::new("writing", "frames"), 0);
+    let mut done = 0;
     for_each_chunk(&make, |chunk| {
         done += chunk.first().map_or(0, Vec::len) as u64;
         outputs.par_iter_mut().zip(chunk).try_for_each(|(output, bundles)| {
@@ -99,18 +109,19 @@ where
                 output.writer.append_frame(bundle.frame.frame_id, FrameRows::from(bundle))
             })
         })?;
-        progress.update(done, total);
+        progress("writing", done, total);
         Ok(())
     })
 }
 
 /// Takes the chunks that `make` makes, while a thread makes the next ones.
-fn for_each_chunk<I>(
-    make: &(impl Fn() -> anyhow::Result<I> + Sync),
-    mut take: impl FnMut(Chunk) -> anyhow::Result<()>,
-) -> anyhow::Result<()>
+fn for_each_chunk<E, I>(
+    make: &(impl Fn() -> Result<I, E> + Sync),
+    mut take: impl FnMut(Chunk) -> Result<(), E>,
+) -> Result<(), E>
 where
-    I: Iterator<Item = anyhow::Result<Chunk>>,
+    E: Send,
+    I: Iterator<Item = Result<Chunk, E>>,
 {
     let (sender, receiver) = sync_channel(WAITING);
     thread::scope(|scope| {
@@ -133,16 +144,17 @@ where
 }
 
 /// One of several outputs with the same observations.
-pub(super) struct Realisation {
+pub struct Realisation {
     /// Where it is written; the tables of the whole sequence, those made here apart, are there already.
-    pub(super) writer: SequenceWriter,
+    pub writer: SequenceWriter,
     /// What the first pass learns.
-    pub(super) tally: Tally,
+    pub tally: Tally,
 }
 
 impl Realisation {
     /// An output; measurements are expected where the manifest declares their noise.
-    pub(super) fn new(writer: SequenceWriter, manifest: &Manifest, groups: &[StructuralGroup]) -> Self {
+    #[must_use]
+    pub fn new(writer: SequenceWriter, manifest: &Manifest, groups: &[StructuralGroup]) -> Self {
         Self { writer, tally: Tally::new(groups, &manifest.cameras, [manifest.noise.is_some(); 2]) }
     }
 }
@@ -165,7 +177,7 @@ impl Observed {
 
 /// What the first pass learns of one output: which observations were measured, and statistics.
 #[derive(Debug)]
-pub(super) struct Tally {
+pub struct Tally {
     groups: Vec<StructuralGroup>,
     cameras: Vec<Camera>,
     expected: [bool; 2],
@@ -194,20 +206,21 @@ impl Tally {
     }
 
     /// Measurements: of points, of lines.
-    pub(super) const fn measurements(&self) -> [u64; 2] {
+    #[must_use]
+    pub const fn measurements(&self) -> [u64; 2] {
         [self.points.kept(), self.lines.kept()]
     }
 
     /// Depths of measured observations that have no measurement.
-    pub(super) const fn lost_depths(&self) -> u64 {
+    #[must_use]
+    pub const fn lost_depths(&self) -> u64 {
         self.lost_depths
     }
 
     /// Adds the next frame.
-    fn add(&mut self, bundle: FrameBundle) -> anyhow::Result<()> {
+    fn add(&mut self, bundle: FrameBundle) -> Result<(), Error> {
         let frame_id = bundle.frame.frame_id;
-        let unobserved =
-            |landmark: String| anyhow::anyhow!("{frame_id}: {landmark} is measured without being observed");
+        let unobserved = |landmark: String| Error::Unobserved { frame_id, landmark };
         self.lost_depths += keep(
             &mut self.points,
             bundle.point_observations.iter().map(|row| (row.point_id, depths([row.depth]))),
@@ -244,7 +257,7 @@ impl Tally {
     }
 
     /// Writes correspondences and statistics.
-    fn write(&self, observed: &Observed, writer: &mut SequenceWriter) -> anyhow::Result<()> {
+    fn write(&self, observed: &Observed, writer: &mut SequenceWriter) -> Result<(), Error> {
         let (measured, seen) = (PointMeasurement::TABLE.name, PointObservation::TABLE.name);
         for piece in observed.points.pieces_of(&self.points, PIECE_ROWS) {
             writer.append(&correspondences(piece, |rows| PointCorrespondence::new(measured, rows)))?;
@@ -259,7 +272,7 @@ impl Tally {
         for piece in observed.lines.pieces(PIECE_ROWS) {
             writer.append(&correspondences(piece, |rows| LineCorrespondence::new(seen, rows)))?;
         }
-        Ok(writer.append(&self.statistics)?)
+        writer.append(&self.statistics)
     }
 }
 
@@ -325,10 +338,14 @@ mod tests {
         sequence
     }
 
-    fn write(sequence: &Sequence, output: &Path) -> anyhow::Result<Written> {
+    fn outline(sequence: &Sequence) -> Outline<'_> {
+        Outline { manifest: &sequence.manifest, frames: &sequence.frames, groups: &[] }
+    }
+
+    fn write(sequence: &Sequence, output: &Path) -> Result<Written, Error> {
         let bundles = || Ok(sequence.bundles().map(Ok));
-        let (manifest, frames) = (&sequence.manifest, &sequence.frames);
-        write_two_pass(output, manifest, frames, WriteOptions::default(), &[], |_| Ok(()), bundles)
+        let options = WriteOptions::default();
+        write_two_pass(output, outline(sequence), options, |_| Ok(()), bundles, &|_, _, _| ())
     }
 
     #[test]
@@ -362,12 +379,12 @@ mod tests {
     fn a_maker_that_fails_is_heard() {
         let folder = tempfile::tempdir().unwrap();
         let sequence = sequence(true);
-        let failing = || Ok(sequence.bundles().take(3).map(Ok).chain([Err(anyhow::anyhow!("no more"))]));
+        let failing =
+            || Ok(sequence.bundles().take(3).map(Ok).chain([Err(Error::Exists { path: "no more".into() })]));
         let output = folder.path().join("out");
-        let (manifest, frames) = (&sequence.manifest, &sequence.frames);
-        let result =
-            write_two_pass(&output, manifest, frames, WriteOptions::default(), &[], |_| Ok(()), failing);
-        assert_eq!(result.unwrap_err().to_string(), "no more");
+        let options = WriteOptions::default();
+        let result = write_two_pass(&output, outline(&sequence), options, |_| Ok(()), failing, &|_, _, _| ());
+        assert!(result.unwrap_err().to_string().starts_with("no more"));
         assert_eq!(folder.path().read_dir().unwrap().count(), 0);
     }
 }

@@ -1,6 +1,7 @@
 //! Converters from raw datasets to Open-Structure sequences.
 
 pub mod command;
+pub mod detect;
 pub mod family;
 pub mod release;
 pub mod rgbd;

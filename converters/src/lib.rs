@@ -1,5 +1,6 @@
 //! Converters from raw datasets to Open-Structure sequences.
 
+pub mod associate;
 pub mod command;
 pub mod detect;
 pub mod family;

@@ -11,6 +11,9 @@ pub struct Family {
     pub name: &'static str,
     /// `fx`, `fy`, `cx`, `cy`, pixels.
     pub intrinsics: [f64; 4],
+    /// Distortion of its images, `k1, k2, p1, p2, k3` of the registry's `brown-conrady`; the rows of the release are free
+    /// of it.
+    pub distortion: Option<[f64; 5]>,
     /// Image sizes that occur, the usual one first, pixels.
     pub sizes: &'static [[u32; 2]],
     /// Where pixel (0, 0) lies, as the registry names it.
@@ -59,67 +62,84 @@ const TARTANAIR: Origin = Origin {
 
 const VGA: &[[u32; 2]] = &[[640, 480]];
 
+/// ICL-NUIM.
+pub(crate) const ICL: Family = Family {
+    name: "icl",
+    intrinsics: [481.20, -480.0, 319.5, 239.5],
+    distortion: None,
+    // A re-release of one sequence is 752 columns wide.
+    sizes: &[[640, 480], [752, 480]],
+    pixel_origin: registry::PIXEL_CENTER,
+    coarse_poses: false,
+    origin: Some(ICL_NUIM),
+    names: &["livingroom", "living_room", "office#", "office_#", "lr_kt", "of_kt"],
+};
+
+/// The simulated sequences of the first release.
+pub(crate) const SIMULATED: Family = Family {
+    name: "simulated",
+    intrinsics: [535.4, 539.2, 320.1, 247.6],
+    distortion: None,
+    sizes: VGA,
+    pixel_origin: registry::PIXEL_CENTER,
+    coarse_poses: false,
+    origin: None,
+    names: &["box", "corridor", "sphere"],
+};
+
+/// TUM RGB-D, the third Kinect.
+pub(crate) const TUM_FR3: Family = Family {
+    name: "tum-fr3",
+    intrinsics: [535.4, 539.2, 320.1, 247.6],
+    distortion: None,
+    sizes: VGA,
+    pixel_origin: registry::PIXEL_CENTER,
+    coarse_poses: true,
+    origin: Some(TUM_RGBD),
+    names: &["structure", "nostructure", "stru_", "nostru_", "fr3", "rgbd_dataset_freiburg3", "cabinet"],
+};
+
+/// TartanAir, first version.
+pub(crate) const TARTANAIR_V1: Family = Family {
+    name: "tartanair",
+    intrinsics: [320.0, 320.0, 320.0, 240.0],
+    distortion: None,
+    sizes: VGA,
+    pixel_origin: registry::PIXEL_CORNER,
+    coarse_poses: false,
+    origin: Some(TARTANAIR),
+    names: &["carwelding", "hospital", "japanesealley", "office"],
+};
+
+/// TUM RGB-D, the first Kinect.
+pub(crate) const TUM_FR1: Family = Family {
+    name: "tum-fr1",
+    intrinsics: [517.3, 516.5, 318.6, 255.3],
+    distortion: Some([0.2624, -0.9531, -0.0054, 0.0026, 1.1633]),
+    sizes: VGA,
+    pixel_origin: registry::PIXEL_CENTER,
+    coarse_poses: true,
+    origin: Some(TUM_RGBD),
+    names: &["fr1", "rgbd_dataset_freiburg1"],
+};
+
+/// TUM RGB-D, the second Kinect.
+pub(crate) const TUM_FR2: Family = Family {
+    name: "tum-fr2",
+    intrinsics: [520.9, 521.0, 325.1, 249.7],
+    distortion: Some([0.2312, -0.7849, -0.0033, -0.0001, 0.9172]),
+    sizes: VGA,
+    pixel_origin: registry::PIXEL_CENTER,
+    coarse_poses: true,
+    origin: Some(TUM_RGBD),
+    names: &["fr2", "rgbd_dataset_freiburg2"],
+};
+
 /// Every family, those of the release first.
 ///
 /// # Sources
 /// The intrinsics are those under which the published rows reproject; they agree with what the datasets publish.
-pub const FAMILIES: &[Family] = &[
-    Family {
-        name: "icl",
-        intrinsics: [481.20, -480.0, 319.5, 239.5],
-        // A re-release of one sequence is 752 columns wide.
-        sizes: &[[640, 480], [752, 480]],
-        pixel_origin: registry::PIXEL_CENTER,
-        coarse_poses: false,
-        origin: Some(ICL_NUIM),
-        names: &["livingroom", "living_room", "office#", "office_#", "lr_kt", "of_kt"],
-    },
-    Family {
-        name: "simulated",
-        intrinsics: [535.4, 539.2, 320.1, 247.6],
-        sizes: VGA,
-        pixel_origin: registry::PIXEL_CENTER,
-        coarse_poses: false,
-        origin: None,
-        names: &["box", "corridor", "sphere"],
-    },
-    Family {
-        name: "tum-fr3",
-        intrinsics: [535.4, 539.2, 320.1, 247.6],
-        sizes: VGA,
-        pixel_origin: registry::PIXEL_CENTER,
-        coarse_poses: true,
-        origin: Some(TUM_RGBD),
-        names: &["structure", "nostructure", "stru_", "nostru_", "fr3", "rgbd_dataset_freiburg3", "cabinet"],
-    },
-    Family {
-        name: "tartanair",
-        intrinsics: [320.0, 320.0, 320.0, 240.0],
-        sizes: VGA,
-        pixel_origin: registry::PIXEL_CORNER,
-        coarse_poses: false,
-        origin: Some(TARTANAIR),
-        names: &["carwelding", "hospital", "japanesealley", "office"],
-    },
-    Family {
-        name: "tum-fr1",
-        intrinsics: [517.3, 516.5, 318.6, 255.3],
-        sizes: VGA,
-        pixel_origin: registry::PIXEL_CENTER,
-        coarse_poses: true,
-        origin: Some(TUM_RGBD),
-        names: &["fr1", "rgbd_dataset_freiburg1"],
-    },
-    Family {
-        name: "tum-fr2",
-        intrinsics: [520.9, 521.0, 325.1, 249.7],
-        sizes: VGA,
-        pixel_origin: registry::PIXEL_CENTER,
-        coarse_poses: true,
-        origin: Some(TUM_RGBD),
-        names: &["fr2", "rgbd_dataset_freiburg2"],
-    },
-];
+pub const FAMILIES: &[Family] = &[ICL, SIMULATED, TUM_FR3, TARTANAIR_V1, TUM_FR1, TUM_FR2];
 
 /// Above this median residual no family is believed to fit, pixels: noise has 1 px, the wrong camera tens.
 pub const BAD_RESIDUAL_PX: f64 = 5.0;
@@ -180,7 +200,7 @@ impl Choice {
 
 impl Family {
     /// The camera with the usual image size.
-    fn camera(&self) -> PinholeCamera {
+    pub(crate) fn camera(&self) -> PinholeCamera {
         let [fx, fy, cx, cy] = self.intrinsics;
         let [width, height] = self.sizes[0];
         PinholeCamera { fx, fy, cx, cy, width, height }

@@ -49,6 +49,21 @@ pub enum Error {
 }
 
 impl Error {
+    /// A file that could not be read.
+    pub fn io(path: impl Into<PathBuf>, source: io::Error) -> Self {
+        Self::Io { path: path.into(), source }
+    }
+
+    /// A folder, or a file as a whole, that is not of the dataset.
+    pub fn layout(path: impl Into<PathBuf>, expected: impl ToString, found: impl ToString) -> Self {
+        Self::Layout { path: path.into(), expected: expected.to_string(), found: found.to_string() }
+    }
+
+    /// A line of a list that cannot be used.
+    pub fn line(path: impl Into<PathBuf>, line: u64, expected: impl ToString, found: impl ToString) -> Self {
+        Self::Line { path: path.into(), line, expected: expected.to_string(), found: found.to_string() }
+    }
+
     /// An image that cannot be used.
     pub fn image(path: impl Into<PathBuf>, expected: impl ToString, found: impl ToString) -> Self {
         Self::Image { path: path.into(), expected: expected.to_string(), found: found.to_string() }

@@ -1,11 +1,12 @@
 //! A sequence as its dataset publishes it.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use open_structure::geometry::Pose;
 use open_structure::structure::{Camera, Clock, Exclusion, FrameId, Source};
 
-use super::{BrownConrady, DepthNoise, Raster};
+use super::{BrownConrady, DepthNoise, Error, Raster};
+use crate::family::{Family, Origin};
 
 /// A frame: when and where it was taken, and its files.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,8 +36,11 @@ pub enum DepthFormat {
     /// A PNG picture of four times 8 bits whose bytes are a 32-bit floating point number: depth along the optical
     /// axis, metres (TartanAir V2).
     FloatPng,
-    /// Text: the distance along each pixel's ray, metres, row by row (ICL-NUIM as its ray tracer wrote it).
-    RayText,
+    /// Text: the distance along each pixel's ray, row by row (ICL-NUIM as its ray tracer wrote it).
+    RayText {
+        /// Units in a metre: 1, and 100 where the scene is in centimetres.
+        units_per_metre: f64,
+    },
 }
 
 /// A sequence as its dataset publishes it; nothing of its images is in memory.
@@ -68,4 +72,35 @@ impl RawSequence {
     pub fn raster(&self) -> Raster {
         Raster::new(&self.camera, self.lens)
     }
+}
+
+/// Where a sequence of a family comes from, but for its files.
+pub(super) fn source(family: &Family, name: &str) -> Source {
+    let text = |of: fn(&Origin) -> &'static str| family.origin.as_ref().map(|origin| of(origin).to_owned());
+    Source {
+        dataset: text(|origin| origin.dataset).unwrap_or_default(),
+        sequence: Some(name.to_owned()),
+        url: text(|origin| origin.url),
+        licence: text(|origin| origin.licence),
+        citation: text(|origin| origin.citation),
+        files: Vec::new(),
+    }
+}
+
+/// The stamp of a frame of a clock that was made: its id divided by the rate, rounded, nanoseconds.
+pub(super) fn tick(id: i64, rate_hz: i64) -> i64 {
+    let (seconds, rest) = (id.div_euclid(rate_hz), id.rem_euclid(rate_hz));
+    seconds.saturating_mul(1_000_000_000).saturating_add((rest * 1_000_000_000 + rate_hz / 2) / rate_hz)
+}
+
+/// The error of a sequence of which nothing can be used.
+pub(super) fn no_frame(root: &Path, excluded: &[Exclusion]) -> Error {
+    let found = if excluded.is_empty() {
+        "none of those that are wanted".to_owned()
+    } else {
+        let reasons =
+            excluded.iter().map(|found| format!("{}: {} {}", found.file, found.count, found.reason));
+        reasons.collect::<Vec<_>>().join("; ")
+    };
+    Error::layout(root, "at least one frame with its images and a true pose", found)
 }

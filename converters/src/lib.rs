@@ -1,6 +1,9 @@
 //! Converters from raw datasets to Open-Structure sequences.
 
+mod agglomerate;
+pub mod associate;
 pub mod command;
+pub mod detect;
 pub mod family;
 pub mod release;
 pub mod rgbd;

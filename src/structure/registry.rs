@@ -23,6 +23,10 @@ pub const SYNTHETIC: &str = "synthetic";
 
 /// Structural group of parallel lines.
 pub const PARALLEL: &str = "parallel";
+/// Structural group of three parallel groups, each at right angles to the others.
+pub const MANHATTAN: &str = "manhattan";
+/// Structural group of one parallel group and several at right angles to it.
+pub const ATLANTA: &str = "atlanta";
 
 /// Noise model: none; measurements equal observations.
 pub const NOISE_NONE: &str = "none";

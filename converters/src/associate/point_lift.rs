@@ -5,24 +5,15 @@ use open_structure::geometry::Pose;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::rims::Rims;
 use crate::detect::{Bits, DetectedPoint};
 use crate::rgbd::{DepthMap, DepthNoise, Raster};
-
-/// What a point at the rim of an object becomes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Rims {
-    /// A point of the nearer surface.
-    Near,
-    /// Nothing.
-    Reject,
-}
 
 /// How points are lifted, fused and found again.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PointLandmarkOptions {
-    /// What a point at the rim of an object becomes.
+    /// What becomes of points at the rim of an object.
     pub rims: Rims,
     /// Standard deviation of a detected position, pixels.
     pub sigma_px: f64,
@@ -44,7 +35,7 @@ pub struct PointLandmarkOptions {
 impl Default for PointLandmarkOptions {
     fn default() -> Self {
         Self {
-            rims: Rims::Near,
+            rims: Rims::Nearer,
             sigma_px: 1.0,
             radius_px: 2.0,
             max_radius_m: 0.1,

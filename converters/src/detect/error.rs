@@ -1,15 +1,17 @@
-//! What can go wrong with a detector.
+//! Why nothing was detected.
 
-/// Errors of this room.
+/// An image that cannot be searched.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// OpenCV refused.
-    #[error("OpenCV: {0}")]
-    OpenCv(String),
-}
-
-impl From<opencv::Error> for Error {
-    fn from(error: opencv::Error) -> Self {
-        Self::OpenCv(error.message)
-    }
+    /// The image is not a grey one.
+    #[error("expected one channel of 8 bits, found {channels} channels of OpenCV depth {depth}")]
+    NotGrey {
+        /// Channels of the image.
+        channels: i32,
+        /// OpenCV's number for the type of a channel.
+        depth: i32,
+    },
+    /// A detector failed.
+    #[error("detector: {0}")]
+    OpenCv(#[from] opencv::Error),
 }

@@ -1,6 +1,6 @@
 //! What the manifest says about a sequence made of images.
 
-use open_structure::structure::{Camera, Exclusion, Generator, Manifest};
+use open_structure::structure::{Exclusion, Generator, Manifest};
 
 use super::Options;
 use crate::rgbd::RawSequence;
@@ -17,11 +17,6 @@ pub(super) fn manifest(
 ) -> Manifest {
     let mut excluded = raw.excluded.clone();
     excluded.extend(unusable);
-    let camera = Camera {
-        depth_min: options.depth.nearest_m.or(raw.camera.depth_min),
-        depth_max: options.depth.farthest_m.or(raw.camera.depth_max),
-        ..raw.camera.clone()
-    };
     let descriptor = "ORB, 32 bytes: the majority of each bit over the points of the landmark";
     let texts = [
         ("options", serde_json::to_string(options).unwrap_or_default()),
@@ -37,7 +32,7 @@ pub(super) fn manifest(
             parameters: texts.map(|(name, text)| (name.to_owned(), text)).into(),
         },
         clock: raw.clock.clone(),
-        cameras: vec![camera],
+        cameras: vec![raw.camera.clone()],
         noise: Some(options.noise.declared(options.seed)),
         excluded,
         ..Manifest::default()

@@ -13,7 +13,9 @@ pub fn documented(options: &Options) -> String {
     settings.inline_subschemas = true;
     let schema = settings.into_generator().into_root_schema_for::<Options>().to_value();
     let values = serde_json::to_value(options).unwrap_or_default();
-    let mut text = String::from("# Configuration of os-convert: every option with its default. Leave out what may stay.\n");
+    let mut text = String::from(
+        "# Configuration of os-convert: every option with its default. Leave out what may stay.\n",
+    );
     table(&mut text, "", &schema, &values);
     text
 }
@@ -48,7 +50,16 @@ fn table(text: &mut String, path: &str, schema: &Value, values: &Value) {
         let _ = writeln!(own, "[{path}]");
         table(&mut own, &path, shape, value);
         if value.is_null() {
-            own = own.lines().map(|line| if line.is_empty() || line.starts_with('#') { format!("{line}\n") } else { format!("# {line}\n") }).collect();
+            own = own
+                .lines()
+                .map(|line| {
+                    if line.is_empty() || line.starts_with('#') {
+                        format!("{line}\n")
+                    } else {
+                        format!("# {line}\n")
+                    }
+                })
+                .collect();
         }
         text.push_str(&own);
     }

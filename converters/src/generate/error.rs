@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use open_structure::structure::LineId;
+
 use crate::{detect, rgbd};
 
 /// Errors of this room.
@@ -42,10 +44,10 @@ pub enum Error {
     #[error(transparent)]
     Format(#[from] open_structure::format::Error),
     /// A line landmark has no length.
-    #[error("line {line}: {source}")]
+    #[error("{line_id}: {source}")]
     Line {
         /// The landmark.
-        line: usize,
+        line_id: LineId,
         /// What is wrong with it.
         source: open_structure::geometry::Error,
     },

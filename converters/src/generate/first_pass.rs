@@ -2,7 +2,6 @@
 
 use open_structure::simulate::Random;
 
-use super::options::Depth;
 use super::{Error, Ledger, Options};
 use crate::associate::{LiftedLine, LiftedPoint, PointRejection, lift, lift_point};
 use crate::detect::{PointDetector, segments};
@@ -22,12 +21,10 @@ pub(super) struct Shown {
 pub(super) fn look(
     raw: &RawSequence,
     raster: &Raster,
-    depth: &Depth,
     options: &Options,
     frame: &RawFrame,
 ) -> Result<Shown, Error> {
-    let mut images = raw.images(frame)?;
-    images.depth.limit(depth.nearest_m, depth.farthest_m);
+    let images = raw.images(frame)?;
     let refused = |source| Error::Detect { path: frame.colour.clone(), source };
     let mut ledger = Ledger { frames: 1, ..Ledger::default() };
 
@@ -39,8 +36,8 @@ pub(super) fn look(
         match lift_point(
             raster,
             &images.depth,
-            &depth.noise,
-            depth.pose_sigma_m,
+            &raw.depth_noise,
+            raw.pose_sigma_m,
             &frame.world_from_camera,
             point,
             &options.point_landmarks,
@@ -62,7 +59,7 @@ pub(super) fn look(
             &images.depth,
             &frame.world_from_camera,
             segment,
-            &depth.noise,
+            &raw.depth_noise,
             &options.lines,
             &mut random,
         ) {

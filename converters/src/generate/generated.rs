@@ -6,8 +6,8 @@ use nalgebra::Point3;
 use open_structure::format::{self, Outline, WriteOptions, Written, write_two_pass};
 use open_structure::geometry::{Pose, Segment};
 use open_structure::structure::{
-    Descriptor, Exclusion, Frame, FrameBundle, GroupId, LineId, LineLandmark, LineObservation, Manifest, MapLine,
-    PointId, PointLandmark, PointObservation, PoseRow, StructuralGroup, registry,
+    Descriptor, Exclusion, Frame, FrameBundle, GroupId, LineId, LineLandmark, LineObservation, Manifest,
+    MapLine, PointId, PointLandmark, PointObservation, PoseRow, StructuralGroup, registry,
 };
 
 use super::describe::manifest;
@@ -58,8 +58,8 @@ pub fn generate(
     progress: &Progress<'_>,
 ) -> Result<Generated, Error> {
     options.check()?;
+    let raw = &options.depth.applied(raw);
     let raster = raw.raster();
-    let depth = options.depth_of(raw);
     let total = raw.frames.len() as u64;
     let mut ledger = Ledger::default();
     let mut excluded: Vec<Exclusion> = Vec::new();
@@ -70,7 +70,7 @@ pub fn generate(
         raw.frames.len(),
         threads,
         AHEAD * threads,
-        |index| look(raw, &raster, &depth, options, &raw.frames[index]),
+        |index| look(raw, &raster, options, &raw.frames[index]),
         |index, shown| {
             match shown {
                 Ok(shown) => {
@@ -84,11 +84,12 @@ pub fn generate(
                 Err(error) => return Err(error),
             }
             progress("detecting", index as u64 + 1, total);
-            Ok(())
+            Ok::<(), Error>(())
         },
     )?;
     if usable.is_empty() {
-        let reason = excluded.first().map_or_else(|| "the lists name none".to_owned(), |first| first.reason.clone());
+        let reason =
+            excluded.first().map_or_else(|| "the lists name none".to_owned(), |first| first.reason.clone());
         return Err(Error::Nothing { what: "frames", frames: raw.frames.len(), reason });
     }
 
@@ -109,11 +110,11 @@ pub fn generate(
         usable.len(),
         threads,
         AHEAD * threads,
-        |index| find(raw, &raster, &depth, options, usable[index], &positions, &segments),
+        |index| find(raw, &raster, options, usable[index], &positions, &segments),
         |index, found| {
             seen.push(found?);
             progress("finding", index as u64 + 1, total);
-            Ok(())
+            Ok::<(), Error>(())
         },
     )?;
     let found = Found { points, lines, segments, groups, seen };
@@ -159,10 +160,10 @@ impl Found {
         }
         let kept = |names: &[Option<u32>], place: usize| names[place].is_some();
         let (mut segments, mut unrefined, mut rows) = (Vec::new(), Vec::new(), Vec::new());
-        for (place, segment) in self.segments.iter().enumerate().filter(|(place, _)| kept(&lines, *place)) {
-            let line_id = LineId(segments.len() as i64);
-            let row = LineLandmark::from_segment(line_id, segment)
-                .map_err(|source| Error::Line { line: segments.len(), source })?;
+        let stay = self.segments.iter().enumerate().filter(|(place, _)| kept(&lines, *place));
+        for (line_id, (place, segment)) in (0..).map(LineId).zip(stay) {
+            let row =
+                LineLandmark::from_segment(line_id, segment).map_err(|source| Error::Line { line_id, source })?;
             rows.push(row);
             segments.push(*segment);
             let before = self.lines[place].segment;
@@ -268,15 +269,18 @@ fn groups_of(groups: &[Group], names: &[Option<u32>]) -> Vec<StructuralGroup> {
         if line_ids.len() < 2 {
             continue;
         }
-        let direction = group.direction.map(nalgebra::Unit::into_inner);
+        let direction = group.direction;
         rows.push(StructuralGroup {
-            group_id: GroupId(rows.len() as i64),
+            group_id: GroupId(0),
             kind: group.kind.to_owned(),
-            direction_x: direction.map(|direction| direction.x),
-            direction_y: direction.map(|direction| direction.y),
-            direction_z: direction.map(|direction| direction.z),
+            direction_x: Some(direction.x),
+            direction_y: Some(direction.y),
+            direction_z: Some(direction.z),
             line_ids,
         });
+    }
+    for (id, row) in (0..).zip(&mut rows) {
+        row.group_id = GroupId(id);
     }
     rows
 }
@@ -376,7 +380,12 @@ impl Generated {
     ///
     /// # Errors
     /// Those of writing; nothing is left behind then.
-    pub fn write(&self, output: &Path, options: WriteOptions, progress: &Progress<'_>) -> Result<Written, format::Error> {
+    pub fn write(
+        &self,
+        output: &Path,
+        options: WriteOptions,
+        progress: &Progress<'_>,
+    ) -> Result<Written, format::Error> {
         let outline = Outline { manifest: &self.manifest, frames: &self.frames, groups: &self.groups };
         write_two_pass(
             output,

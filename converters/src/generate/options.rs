@@ -9,9 +9,6 @@ use crate::associate::{GroupOptions, LineOptions, PointLandmarkOptions};
 use crate::detect::{PointOptions, SegmentOptions};
 use crate::rgbd::{DepthNoise, RawSequence};
 
-/// Largest configuration that is read, bytes.
-pub const MAX_CONFIG_BYTES: u64 = 1 << 20;
-
 /// Every threshold of a conversion; what a configuration leaves out has its default.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -136,33 +133,28 @@ impl Options {
         for (place, value, [least, most]) in numbers {
             within(place, value, least, most)?;
         }
-        groups.check()?;
+        within("groups.angle_deg", groups.angle_deg, 0.0, 45.0)?;
+        within("groups.shift_m", groups.shift_m, 0.0, 1e3)?;
+        within("groups.least", groups.least as f64, 2.0, 1e6)?;
+        within("groups.orthogonal_deg", groups.orthogonal_deg, 0.0, 20.0)?;
         self.noise.check().map_err(|error| Error::Option {
             place: "noise".to_owned(),
             expected: "a noise model with its parameters".to_owned(),
             found: error.to_string(),
         })
     }
-
-    /// The dataset's word on its depth maps, and the configuration's where it has one.
-    pub(super) fn depth_of(&self, raw: &RawSequence) -> Depth {
-        let DepthOptions { nearest_m, farthest_m, noise, pose_sigma_m } = self.depth;
-        Depth {
-            nearest_m: nearest_m.or(raw.camera.depth_min).unwrap_or(0.0),
-            farthest_m: farthest_m.or(raw.camera.depth_max).unwrap_or(f64::INFINITY),
-            noise: noise.unwrap_or(raw.depth_noise),
-            pose_sigma_m: pose_sigma_m.unwrap_or(raw.pose_sigma_m),
-        }
-    }
 }
 
-/// What is thought of the depth maps of a sequence.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Depth {
-    pub(super) nearest_m: f64,
-    pub(super) farthest_m: f64,
-    pub(super) noise: DepthNoise,
-    pub(super) pose_sigma_m: f64,
+impl DepthOptions {
+    /// A sequence with what the configuration says in place of what the dataset does.
+    pub(super) fn applied(&self, raw: &RawSequence) -> RawSequence {
+        let mut raw = raw.clone();
+        raw.camera.depth_min = self.nearest_m.or(raw.camera.depth_min);
+        raw.camera.depth_max = self.farthest_m.or(raw.camera.depth_max);
+        raw.depth_noise = self.noise.unwrap_or(raw.depth_noise);
+        raw.pose_sigma_m = self.pose_sigma_m.unwrap_or(raw.pose_sigma_m);
+        raw
+    }
 }
 
 fn within(place: &str, value: f64, least: f64, most: f64) -> Result<(), Error> {

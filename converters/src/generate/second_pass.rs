@@ -3,7 +3,6 @@
 use nalgebra::Point3;
 use open_structure::geometry::Segment;
 
-use super::options::Depth;
 use super::{Error, Options};
 use crate::associate::visible_part;
 use crate::rgbd::{Raster, RawFrame, RawSequence, Sight};
@@ -32,31 +31,30 @@ pub(super) struct Seen {
 pub(super) fn find(
     raw: &RawSequence,
     raster: &Raster,
-    depth: &Depth,
     options: &Options,
     frame: &RawFrame,
     points: &[Point3<f64>],
     lines: &[Segment],
 ) -> Result<Seen, Error> {
-    let mut map = raw.depth(frame)?;
-    map.limit(depth.nearest_m, depth.farthest_m);
+    let map = raw.depth(frame)?;
+    let depths_m = raw.camera.depth_min.unwrap_or(0.0)..=raw.camera.depth_max.unwrap_or(f64::INFINITY);
     let camera_from_world = frame.world_from_camera.inverse();
     let focal_px = raster.camera().fx.abs();
     let mut seen = Seen::default();
     for (place, point) in (0..).zip(points) {
         let in_camera = camera_from_world * *point;
-        if !(depth.nearest_m..=depth.farthest_m).contains(&in_camera.z) {
+        if !depths_m.contains(&in_camera.z) {
             continue;
         }
         let Some((_, position)) = raster.project(in_camera) else { continue };
-        match map.sight(position, in_camera.z, focal_px, &depth.noise, 1) {
+        match map.sight(position, in_camera.z, focal_px, &raw.depth_noise, 1) {
             Sight::Seen => seen.points.push(place),
             Sight::Absent => seen.absent_points.push(place),
             Sight::Hidden | Sight::Unknown => (),
         }
     }
     for (place, line) in (0..).zip(lines) {
-        let part = visible_part(raster, &map, &depth.noise, &camera_from_world, line, &options.lines);
+        let part = visible_part(raster, &map, &raw.depth_noise, &camera_from_world, line, &options.lines);
         seen.lines.extend(part.map(|part| SeenLine { line: place, part }));
     }
     Ok(seen)

@@ -51,7 +51,7 @@ pub(super) fn camera(
         let [width, height] = match given.size {
             Some(size) => size,
             None => {
-                published().map(|found| [found.pinhole.width, found.pinhole.height]).unwrap_or([640, 480])
+                published().map_or([640, 480], |found| [found.pinhole.width, found.pinhole.height])
             }
         };
         checked(given.fx, given.fy, given.cx, given.cy, [width, height])

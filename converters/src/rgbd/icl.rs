@@ -84,6 +84,7 @@ pub fn open(folder: &Path, options: &OpenOptions) -> Result<RawSequence, Error> 
         lens,
         depth_format: opened.depth_format,
         depth_noise: opened.depth_noise,
+        pose_sigma_m: 0.0,
         frames: opened.frames,
         excluded,
     })

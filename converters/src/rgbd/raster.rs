@@ -33,6 +33,13 @@ impl Raster {
         &self.camera
     }
 
+    /// The image positions within the image: least u, greatest u, least v, greatest v; the greatest are outside.
+    #[must_use]
+    pub fn bounds(&self) -> [f64; 4] {
+        let from = self.first - 0.5;
+        [from, from + f64::from(self.camera.width), from, from + f64::from(self.camera.height)]
+    }
+
     /// Image position of a raster position; `None` where the lens has none.
     #[must_use]
     pub fn image(&self, raster: Point2<f64>) -> Option<Point2<f64>> {

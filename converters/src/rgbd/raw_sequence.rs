@@ -60,6 +60,8 @@ pub struct RawSequence {
     pub depth_format: DepthFormat,
     /// How far depth may be from the surface.
     pub depth_noise: DepthNoise,
+    /// Standard deviation of the true positions, metres.
+    pub pose_sigma_m: f64,
     /// The frames, ascending by stamp and by id.
     pub frames: Vec<RawFrame>,
     /// What the lists name and cannot be used, counted: files that are missing, images without a pose, ...

@@ -136,6 +136,7 @@ pub fn open(folder: &Path, options: &OpenOptions) -> Result<RawSequence, Error> 
         lens,
         depth_format: names.depth_format,
         depth_noise: NOISE,
+        pose_sigma_m: 0.0,
         frames,
         excluded,
     })

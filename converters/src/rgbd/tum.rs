@@ -31,6 +31,12 @@ const DEPTH_M: [f64; 2] = [0.4, 5.0];
 pub(super) const KINECT_NOISE: DepthNoise =
     DepthNoise { constant_m: 0.5 / STEPS_PER_METRE, linear: 0.0, quadratic_per_m: 1.425e-3 };
 
+/// Standard deviation of a true position, metres: motion capture, its calibration to the camera, and the camera's shutter.
+///
+/// # Source
+/// Sturm et al. 2012, section V: the true poses are within 1 cm of the camera's.
+const POSE_SIGMA_M: f64 = 0.005;
+
 /// Opens a sequence of TUM RGB-D.
 ///
 /// Colour images and depth maps are paired by their stamps, the closest first, within
@@ -117,6 +123,7 @@ pub fn open(folder: &Path, options: &OpenOptions) -> Result<RawSequence, Error> 
         lens,
         depth_format: DepthFormat::Png { steps_per_metre: STEPS_PER_METRE },
         depth_noise: KINECT_NOISE,
+        pose_sigma_m: POSE_SIGMA_M,
         frames,
         excluded,
     })

@@ -1,5 +1,7 @@
 //! Measurements instead of images: the Open-Structure format, its validator and its tools.
 
+#[cfg(feature = "archive")]
+pub mod archive;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod format;
@@ -8,6 +10,7 @@ pub mod plot;
 pub mod simulate;
 pub mod statistics;
 pub mod structure;
+mod unfinished;
 pub mod validate;
 
 /// The README's Rust compiles.

@@ -12,7 +12,9 @@ use std::path::{Path, PathBuf};
 const ROOMS: &[(&str, &[&str])] = &[
     ("geometry", &[]),
     ("structure", &["geometry"]),
-    ("format", &["geometry", "structure"]),
+    ("unfinished", &[]),
+    ("archive", &["unfinished"]),
+    ("format", &["geometry", "structure", "unfinished"]),
     ("simulate", &["geometry", "structure"]),
     ("track", &["geometry", "structure"]),
     ("adjust", &["geometry", "structure"]),
@@ -43,6 +45,11 @@ const LIBRARIES: &[(&[&str], &[&str], &str)] = &[
         &["arrow", "parquet", "mcap", "foxglove"],
         &["src/format/"],
         "files are the business of the room `format`",
+    ),
+    (
+        &["tar", "flate2", "zip"],
+        &["src/archive/", "converters/src/text_release/"],
+        "archives are the business of the room `archive`",
     ),
     (
         &["clap", "clap_complete", "clap_mangen", "comfy_table", "anyhow", "indicatif", "ctrlc"],

@@ -1,0 +1,97 @@
+//! Outputs under temporary names until they are whole, and what removes them when a program is interrupted.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+/// Temporary names that are in use, for [`discard`].
+static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+/// Removes every unfinished output of this process: what a program does when it is interrupted.
+pub fn discard() {
+    for path in UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).iter() {
+        // Other threads go on writing: a file that appears in a folder while it is emptied keeps it from going.
+        // Nothing more can be done about a temporary file that cannot be removed.
+        let _ = (0..100).find(|_| remove(path).is_ok());
+    }
+}
+
+/// A file or folder beside its final name; it vanishes when it is not finished.
+///
+/// The temporary name is `.NAME.<pid>.partial`, in the same folder, so that renaming is atomic.
+#[derive(Debug)]
+pub(crate) struct Unfinished {
+    target: PathBuf,
+    temporary: PathBuf,
+    finished: bool,
+}
+
+impl Unfinished {
+    /// Reserves a temporary name; the folder that it lies in is made where it is missing.
+    pub(crate) fn beside(target: &Path) -> io::Result<Self> {
+        let name = target
+            .file_name()
+            .ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "the output has no file name"))?;
+        let parent =
+            target.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        fs::create_dir_all(parent)?;
+        let temporary = parent.join(format!(".{}.{}.partial", name.to_string_lossy(), std::process::id()));
+        UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).insert(temporary.clone());
+        Ok(Self { target: target.to_owned(), temporary, finished: false })
+    }
+
+    /// The final name.
+    pub(crate) fn target(&self) -> &Path {
+        &self.target
+    }
+
+    /// The temporary name.
+    pub(crate) fn path(&self) -> &Path {
+        &self.temporary
+    }
+
+    /// Makes the temporary folder, empty.
+    pub(crate) fn create_folder(&self) -> io::Result<()> {
+        remove(&self.temporary)?;
+        fs::create_dir(&self.temporary)
+    }
+
+    /// Gives the output its final name; what stands there goes only now.
+    pub(crate) fn finish(mut self) -> io::Result<()> {
+        let occupied = self.target.symlink_metadata().is_ok();
+        if occupied && (self.target.is_dir() || self.temporary.is_dir()) {
+            // A folder cannot be renamed over another: the old one steps aside first.
+            let aside = self.temporary.with_extension("old");
+            fs::rename(&self.target, &aside)?;
+            fs::rename(&self.temporary, &self.target).inspect_err(|_| {
+                let _ = fs::rename(&aside, &self.target);
+            })?;
+            remove(&aside)?;
+        } else {
+            fs::rename(&self.temporary, &self.target)?;
+        }
+        self.finished = true;
+        Ok(())
+    }
+}
+
+fn remove(path: &Path) -> io::Result<()> {
+    match path.symlink_metadata() {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        Err(error) => Err(error),
+        Ok(found) if found.is_dir() => fs::remove_dir_all(path),
+        Ok(_) => fs::remove_file(path),
+    }
+}
+
+impl Drop for Unfinished {
+    fn drop(&mut self) {
+        if !self.finished {
+            // Nothing more can be done about a temporary file that cannot be removed.
+            let _ = remove(&self.temporary);
+        }
+        UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).remove(&self.temporary);
+    }
+}

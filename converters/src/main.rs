@@ -1,6 +1,7 @@
 //! The program `os-convert`: raw datasets to sequences.
 
 use clap::Parser;
+use open_structure_converters::command::rgbd::{self, Dataset};
 use open_structure_converters::command::{Outcome, text_release};
 use std::io::{self, Write as _};
 use std::process::ExitCode;
@@ -16,6 +17,20 @@ struct Cli {
 #[derive(Debug, clap::Subcommand)]
 enum Command {
     OpenStructure(text_release::Args),
+    /// Make a sequence of a sequence of TUM RGB-D: images of a Kinect
+    ///
+    /// Reads rgb.txt, depth.txt, groundtruth.txt and the images they name; pairs images by stamps, interpolates the true
+    /// pose at the colour image's, and removes the lens distortion of freiburg1 and freiburg2.
+    Tum(rgbd::Args),
+    /// Make a sequence of a sequence of ICL-NUIM: rendered rooms
+    ///
+    /// Reads the PNG version with its *.gt.freiburg, and the original one of the ray tracer (scene_*.png, .depth, .txt).
+    Icl(rgbd::Args),
+    /// Make a sequence of a sequence of TartanAir: rendered scenes, V1 and V2
+    ///
+    /// Reads the left camera of V1 and the front one of V2: images, depth maps, and poses, which are north-east-down.
+    #[command(name = "tartanair")]
+    TartanAir(rgbd::Args),
 }
 
 fn main() -> ExitCode {
@@ -29,6 +44,9 @@ fn main() -> ExitCode {
     let mut stderr = io::stderr();
     let result = match &cli.command {
         Command::OpenStructure(args) => text_release::run(args, &mut stdout, &mut stderr),
+        Command::Tum(args) => rgbd::run(Dataset::Tum, args, &mut stdout, &mut stderr),
+        Command::Icl(args) => rgbd::run(Dataset::Icl, args, &mut stdout, &mut stderr),
+        Command::TartanAir(args) => rgbd::run(Dataset::TartanAir, args, &mut stdout, &mut stderr),
     };
     let outcome = result.unwrap_or_else(|error| {
         // Where even stderr is closed there is nobody to tell.

@@ -20,6 +20,7 @@ mod limits;
 mod metered;
 mod sink;
 mod tar_archive;
+mod temporary;
 mod unpack;
 mod zip_archive;
 
@@ -30,4 +31,5 @@ pub use crate::unfinished::discard as discard_unfinished;
 pub use error::Error;
 pub use kind::Kind;
 pub use limits::Limits;
+pub use temporary::Temporary;
 pub use unpack::{Selection, Unpacked, extract, unpack};

@@ -1,8 +1,12 @@
 //! Commands of `os-convert`: arguments, calls, rendering.
 
+mod parse;
 mod progress;
+pub mod rgbd;
+mod stages;
 mod summary;
 pub mod text_release;
+mod unpacked;
 
 /// How a command ended; `main` makes the exit code of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

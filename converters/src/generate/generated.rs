@@ -162,8 +162,8 @@ impl Found {
         let (mut segments, mut unrefined, mut rows) = (Vec::new(), Vec::new(), Vec::new());
         let stay = self.segments.iter().enumerate().filter(|(place, _)| kept(&lines, *place));
         for (line_id, (place, segment)) in (0..).map(LineId).zip(stay) {
-            let row =
-                LineLandmark::from_segment(line_id, segment).map_err(|source| Error::Line { line_id, source })?;
+            let row = LineLandmark::from_segment(line_id, segment)
+                .map_err(|source| Error::Line { line_id, source })?;
             rows.push(row);
             segments.push(*segment);
             let before = self.lines[place].segment;

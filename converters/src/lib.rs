@@ -2,6 +2,7 @@
 
 pub mod command;
 pub mod family;
+pub mod ordered;
 pub mod release;
 pub mod rgbd;
 pub mod text_release;

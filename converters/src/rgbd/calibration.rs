@@ -50,9 +50,7 @@ pub(super) fn camera(
     let pinhole = if let Some(given) = options.camera {
         let [width, height] = match given.size {
             Some(size) => size,
-            None => {
-                published().map(|found| [found.pinhole.width, found.pinhole.height]).unwrap_or([640, 480])
-            }
+            None => published().map_or([640, 480], |found| [found.pinhole.width, found.pinhole.height]),
         };
         checked(given.fx, given.fy, given.cx, given.cy, [width, height])
             .ok_or_else(|| Error::layout("camera", EXPECTED, format!("{given:?}")))?

@@ -24,7 +24,8 @@ const NOISE: DepthNoise = DepthNoise { constant_m: 1e-3, linear: 5e-4, quadratic
 fn data() -> Option<PathBuf> {
     let data = std::env::var_os("OPEN_STRUCTURE_DATA")
         .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from);
-    let here = data.join("rgbd/tartanair_hospital_60").is_dir() && data.join("open-structure/hospital").is_dir();
+    let here =
+        data.join("rgbd/tartanair_hospital_60").is_dir() && data.join("open-structure/hospital").is_dir();
     if !here {
         println!("SKIPPED: the hospital frames are not here; set OPEN_STRUCTURE_DATA to convert them");
     }
@@ -152,11 +153,8 @@ fn convert(
     }
     let before = map.len();
     let candidates = map.finish();
-    let kept: Vec<Segment> = candidates
-        .iter()
-        .filter(|line| line.frames.len() >= least_views)
-        .map(|line| line.segment)
-        .collect();
+    let kept: Vec<Segment> =
+        candidates.iter().filter(|line| line.frames.len() >= least_views).map(|line| line.segment).collect();
     let mut grouped = kept.clone();
     let groups = group_lines(&mut grouped, grouping);
     let start = std::time::Instant::now();
@@ -170,11 +168,17 @@ fn convert(
         }
     }
     spent[4] += start.elapsed().as_secs_f64();
-    let lines: Vec<_> = kept.iter().zip(&views).filter(|(_, n)| **n >= least_views).map(|(l, _)| *l).collect();
-    let grouped: Vec<_> = grouped.iter().zip(&views).filter(|(_, n)| **n >= least_views).map(|(l, _)| *l).collect();
+    let lines: Vec<_> =
+        kept.iter().zip(&views).filter(|(_, n)| **n >= least_views).map(|(l, _)| *l).collect();
+    let grouped: Vec<_> =
+        grouped.iter().zip(&views).filter(|(_, n)| **n >= least_views).map(|(l, _)| *l).collect();
     println!(
         "detected {detected}, lifted {lifted}, rejected {rejected:?}, landmarks {before} -> {} -> {} -> {}, views {}, {:.1} s {spent:.2?}",
-        candidates.len(), kept.len(), grouped.len(), views.iter().sum::<usize>(), clock.elapsed().as_secs_f64()
+        candidates.len(),
+        kept.len(),
+        grouped.len(),
+        views.iter().sum::<usize>(),
+        clock.elapsed().as_secs_f64()
     );
     for group in groups.iter().take(4).chain(groups.iter().filter(|g| g.kind != registry::PARALLEL)) {
         println!("  {} of {} {:.3?}", group.kind, group.members.len(), group.direction.as_slice());

@@ -1,7 +1,7 @@
 //! Well-known values: the registry of the specification in code.
 
 /// Version of the specification that this crate writes.
-pub const SPEC_VERSION: &str = "1.1.0";
+pub const SPEC_VERSION: &str = "1.2.0";
 
 /// Camera model: perspective projection without distortion.
 pub const PINHOLE: &str = "pinhole";
@@ -143,7 +143,17 @@ pub const FAMILIES: &[Family] = &[
         name: "group kind",
         place: "`structural_groups.kind`",
         open: true,
-        values: &[(PARALLEL, "all lines of the group have the same direction, up to sign")],
+        values: &[
+            (PARALLEL, "all lines of the group have the same direction, up to sign"),
+            (
+                MANHATTAN,
+                "the lines of three `parallel` groups whose directions are perpendicular to each other; its direction is that of one of them",
+            ),
+            (
+                ATLANTA,
+                "the lines of three or more `parallel` groups: one whose direction it has, and others whose directions are perpendicular to that one",
+            ),
+        ],
     },
     Family {
         name: "noise model",

@@ -43,7 +43,8 @@ impl FrameCounter {
         measured_lines: bool,
     ) -> Self {
         let mut groups_of: HashMap<LineId, Vec<GroupId>> = HashMap::new();
-        for group in groups {
+        // What is made of groups ties no line that they do not tie.
+        for group in groups.iter().filter(|group| !group.is_made_of_groups()) {
             for line in &group.line_ids {
                 groups_of.entry(*line).or_default().push(group.group_id);
             }

@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use super::id::{GroupId, LineId};
 use super::record::record;
+use super::registry;
 
 record! {
     /// A group of lines tied by structure, such as parallel lines.
@@ -11,7 +12,7 @@ record! {
         /// Name of the group.
         ["1", "-"]
         group_id: GroupId,
-        /// Kind of the group; the registry has `parallel`.
+        /// Kind of the group; the registry has `parallel`, `manhattan` and `atlanta`.
         ["1", "-"]
         kind: String,
         /// Common direction, of unit length, x; absent where no line of the group has a landmark.
@@ -30,6 +31,14 @@ record! {
 }
 
 impl StructuralGroup {
+    /// Whether the group is made of parallel groups, as `manhattan` and `atlanta` are.
+    ///
+    /// Its parts are the groups of kind `parallel` whose lines it lists.
+    #[must_use]
+    pub fn is_made_of_groups(&self) -> bool {
+        [registry::MANHATTAN, registry::ATLANTA].contains(&self.kind.as_str())
+    }
+
     /// Common direction in `world`; `None` when it is not known or not whole.
     #[must_use]
     pub fn direction(&self) -> Option<Vector3<f64>> {

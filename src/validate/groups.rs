@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use nalgebra::Vector3;
 
 use super::finding::{Detail, Findings};
+use super::group_parts::Parts;
 use super::landmarks::{Landmarks, LineEntry};
 use super::rules::RuleId;
 use super::tables::{Outcome, Shared, check};
@@ -28,17 +29,22 @@ pub(crate) fn groups(
 ) -> (GroupsOfLine, Outcome) {
     let mut groups_of: GroupsOfLine = HashMap::new();
     let mut first_group: HashMap<(String, LineId), GroupId> = HashMap::new();
+    let mut parts = Parts::default();
     let outcome = check::<StructuralGroup>(shared, findings, |batch, first_row, _, findings| {
         for (row, group) in (first_row..).zip(batch) {
             kinds.insert(group.kind.clone());
             members(group, row, &mut first_group, findings);
-            for line in &group.line_ids {
-                groups_of.entry(line.0).or_default().push(group.group_id.0);
+            if !group.is_made_of_groups() {
+                for line in &group.line_ids {
+                    groups_of.entry(line.0).or_default().push(group.group_id.0);
+                }
             }
             let directions: BTreeMap<LineId, Vector3<f64>> = known_lines(group, row, lines, findings);
             direction(group, row, lines.is_some(), &directions, findings);
+            parts.add(group, row);
         }
     });
+    parts.check(findings);
     (groups_of, outcome)
 }
 
@@ -112,7 +118,10 @@ fn direction(
     let Some(stored) = group.direction() else {
         if present > 0 {
             broken("all three parts of the direction, or none", format!("{present} of them"));
-        } else if group.kind == registry::PARALLEL && lines_known && !directions.is_empty() {
+        } else if (group.kind == registry::PARALLEL || group.is_made_of_groups())
+            && lines_known
+            && !directions.is_empty()
+        {
             let found = format!("none, though {} of its lines have a landmark", directions.len());
             broken("a direction", found);
         }

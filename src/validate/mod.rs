@@ -25,6 +25,7 @@ mod frame_rows;
 mod frame_statistics;
 mod frames;
 mod graphs;
+mod group_parts;
 mod groups;
 mod ids;
 mod landmarks;

@@ -212,6 +212,12 @@ rules! {
     GroupDirection: "group-direction", Error, "6.6",
         "The direction of a group MUST be whole, and of unit length within 1e-6; it is absent only if no line of the group has a landmark.",
         None, "1.0.0";
+    GroupOfGroups: "group-of-groups", Error, "6.6",
+        "The lines of a `manhattan` or `atlanta` group MUST be all lines of certain `parallel` groups: three of them in a `manhattan` group, three or more in an `atlanta` group.",
+        Some("A reader finds its parallel groups by their lines."), "1.2.0";
+    GroupDirectionsOrthogonal: "group-directions-orthogonal", Error, "6.6",
+        "The direction of a `manhattan` or `atlanta` group MUST be that of one of its parallel groups, and those of the others perpendicular to it, within 1e-3 rad; in a `manhattan` group, all three are perpendicular to each other.",
+        Some("A solver may then turn all of them together."), "1.2.0";
     GraphVerticesKnown: "graph-vertices-known", Error, "6.14",
         "The vertices of a factor MUST be in the vertex tables of its graph.",
         None, "1.0.0";

@@ -73,9 +73,15 @@ fn statistics(document: &Document) -> Vec<Vec<Cell>> {
         }
     }
     let groups: Vec<BTreeSet<i64>> = document.table("structural_groups").map_or_else(Vec::new, |table| {
-        let lists = (0..table.rows.len()).filter_map(|row| match table.cell(row, "line_ids") {
-            Some(Cell::Ints(lines)) => Some(lines.iter().flatten().copied().collect()),
-            _ => None,
+        let compound = |row: &usize| match table.cell(*row, "kind") {
+            Some(Cell::Text(kind)) => ["manhattan", "atlanta"].contains(&kind.as_str()),
+            _ => false,
+        };
+        let lists = (0..table.rows.len()).filter(|row| !compound(row)).filter_map(|row| {
+            match table.cell(row, "line_ids") {
+                Some(Cell::Ints(lines)) => Some(lines.iter().flatten().copied().collect()),
+                _ => None,
+            }
         });
         lists.collect()
     });

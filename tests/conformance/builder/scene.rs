@@ -389,7 +389,7 @@ fn graph(scene: &Scene, world: &World, measured: &Rows, add: &mut Add<'_>) -> Re
         let information = diagonal(&[1e4, 1e4, 1e4, 1e2, 1e2, 1e2]);
         factor("relative-pose", vertices, cells(&between).collect(), information);
     }
-    for group in &scene.groups {
+    for group in scene.groups.iter().filter(|group| group.kind == "parallel") {
         for line in &group.line_ids {
             let vertices = [None, None, None, Some(*line), Some(group.group_id)];
             factor("parallelism", vertices, Vec::new(), Cell::Null);

@@ -87,6 +87,13 @@ pub struct Args {
     /// Leave frames and lines out that cannot be used, and count them, where else the first is an error
     #[arg(long)]
     keep_going: bool,
+    /// Draw frames over their images, as PNG in this folder: what was detected in blue, what is observed in green, lines of a
+    /// group in its colour
+    #[arg(long, value_name = "DIR")]
+    pictures: Option<PathBuf>,
+    /// Frames that are drawn, evenly over the sequence
+    #[arg(long, value_name = "N", default_value_t = 10, requires = "pictures")]
+    picture_count: usize,
     /// Add channels for Foxglove and Lichtblick to an MCAP file
     #[arg(long)]
     foxglove: bool,
@@ -227,6 +234,9 @@ pub fn run(
     let generated = generate::generate(&raw, &name, &options, threads, args.keep_going, &update)?;
     let write = WriteOptions { force: args.force, foxglove: args.foxglove, ..WriteOptions::default() };
     generated.write(output, write, &update)?;
+    if let Some(folder) = &args.pictures {
+        pictures(&raw, &generated, &options, folder, args.picture_count, &update)?;
+    }
     drop(stages);
     drop(unpacked);
 
@@ -237,6 +247,27 @@ pub fn run(
         report.render(stdout)?;
     }
     Ok(if report.frames_left_out() { Outcome::Findings } else { Outcome::Done })
+}
+
+/// Draws some frames.
+fn pictures(
+    raw: &RawSequence,
+    generated: &Generated,
+    options: &Options,
+    folder: &Path,
+    count: usize,
+    progress: &generate::Progress<'_>,
+) -> anyhow::Result<()> {
+    std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    let frames = generated.frames();
+    let count = count.min(frames.len());
+    for number in 0..count {
+        let index = number * frames.len() / count;
+        let path = folder.join(format!("{:06}.png", frames[index].frame_id.0));
+        generate::overlay(raw, generated, options, index, &path)?;
+        progress("drawing", number as u64 + 1, count as u64);
+    }
+    Ok(())
 }
 
 /// What is said about a converted sequence.

@@ -40,6 +40,14 @@ pub enum Error {
         /// Where it went.
         reason: String,
     },
+    /// A picture cannot be drawn or written.
+    #[error("{}: {detail}", path.display())]
+    Picture {
+        /// The picture.
+        path: PathBuf,
+        /// Why.
+        detail: String,
+    },
     /// The sequence cannot be written.
     #[error(transparent)]
     Format(#[from] open_structure::format::Error),

@@ -11,6 +11,7 @@ mod first_pass;
 mod generated;
 mod ledger;
 mod options;
+mod overlay;
 mod second_pass;
 
 pub use describe::TOOL;
@@ -19,6 +20,7 @@ pub use error::Error;
 pub use generated::{Generated, generate};
 pub use ledger::Ledger;
 pub use options::{DepthOptions, Options};
+pub use overlay::overlay;
 
 /// Told the stage, what is done, and of how much; from one thread.
 pub type Progress<'a> = dyn Fn(&'static str, u64, u64) + Sync + 'a;

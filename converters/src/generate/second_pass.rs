@@ -40,6 +40,8 @@ pub(super) fn find(
     let depths_m = raw.camera.depth_min.unwrap_or(0.0)..=raw.camera.depth_max.unwrap_or(f64::INFINITY);
     let camera_from_world = frame.world_from_camera.inverse();
     let focal_px = raster.camera().fx.abs();
+    // Where a true pose is off, so is every landmark that it shows.
+    let noise = raw.depth_noise.with_constant(raw.pose_sigma_m);
     let mut seen = Seen::default();
     for (place, point) in (0..).zip(points) {
         let in_camera = camera_from_world * *point;
@@ -47,14 +49,14 @@ pub(super) fn find(
             continue;
         }
         let Some((_, position)) = raster.project(in_camera) else { continue };
-        match map.sight(position, in_camera.z, focal_px, &raw.depth_noise, 1) {
+        match map.sight(position, in_camera.z, focal_px, &noise, 1) {
             Sight::Seen => seen.points.push(place),
             Sight::Absent => seen.absent_points.push(place),
             Sight::Hidden | Sight::Unknown => (),
         }
     }
     for (place, line) in (0..).zip(lines) {
-        let part = visible_part(raster, &map, &raw.depth_noise, &camera_from_world, line, &options.lines);
+        let part = visible_part(raster, &map, &noise, &camera_from_world, line, &options.lines);
         seen.lines.extend(part.map(|part| SeenLine { line: place, part }));
     }
     Ok(seen)

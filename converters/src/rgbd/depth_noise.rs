@@ -21,4 +21,10 @@ impl DepthNoise {
     pub fn sigma_m(&self, depth_m: f64) -> f64 {
         self.constant_m + depth_m * (self.linear + depth_m * self.quadratic_per_m)
     }
+
+    /// The noise with more of what every depth has, metres.
+    #[must_use]
+    pub fn with_constant(&self, more_m: f64) -> Self {
+        Self { constant_m: self.constant_m + more_m, ..*self }
+    }
 }

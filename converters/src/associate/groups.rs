@@ -28,7 +28,8 @@ pub struct GroupOptions {
 
 impl Default for GroupOptions {
     fn default() -> Self {
-        Self { angle_deg: 3.0, shift_m: 0.03, least: 2, orthogonal_deg: 1.0 }
+        // Of a hundred lines, two are parallel to within three degrees by chance.
+        Self { angle_deg: 3.0, shift_m: 0.03, least: 3, orthogonal_deg: 1.0 }
     }
 }
 

@@ -213,7 +213,7 @@ impl Found {
             segments,
             lines: rows,
             unrefined,
-            groups: groups_of(&self.groups, &lines),
+            groups: groups_of(&self.groups, &lines, options.groups.least),
             seen: self.seen,
             ledger,
         })
@@ -259,25 +259,43 @@ impl Found {
     }
 }
 
-/// Groups of the lines that stay; one of a single line ties nothing.
-fn groups_of(groups: &[Group], names: &[Option<u32>]) -> Vec<StructuralGroup> {
-    let mut rows = Vec::new();
-    for group in groups {
-        let mut line_ids: Vec<LineId> =
+/// Groups of the lines that stay.
+///
+/// Parallel groups that fell below `least` lines are no groups any more, and what was made of them is as long as three are left.
+fn groups_of(groups: &[Group], names: &[Option<u32>], least: usize) -> Vec<StructuralGroup> {
+    let ids = |group: &Group| {
+        let mut ids: Vec<LineId> =
             group.members.iter().filter_map(|place| names[*place]).map(|name| LineId(name.into())).collect();
-        line_ids.sort_unstable();
-        if line_ids.len() < 2 {
-            continue;
+        ids.sort_unstable();
+        ids
+    };
+    let is_parallel = |group: &&Group| group.kind == registry::PARALLEL;
+    let row = |group: &Group, line_ids: Vec<LineId>| StructuralGroup {
+        group_id: GroupId(0),
+        kind: group.kind.to_owned(),
+        direction_x: Some(group.direction.x),
+        direction_y: Some(group.direction.y),
+        direction_z: Some(group.direction.z),
+        line_ids,
+    };
+    let mut rows: Vec<StructuralGroup> = groups
+        .iter()
+        .filter(is_parallel)
+        .map(|group| row(group, ids(group)))
+        .filter(|row| row.line_ids.len() >= least.max(2))
+        .collect();
+    for group in groups.iter().filter(|group| !is_parallel(group)) {
+        let all = ids(group);
+        let within = |row: &&StructuralGroup| row.line_ids.iter().all(|id| all.binary_search(id).is_ok());
+        let parts: Vec<&StructuralGroup> =
+            rows.iter().filter(|row| row.kind == registry::PARALLEL).filter(within).collect();
+        let axis_stays = parts.iter().any(|row| row.direction() == Some(group.direction));
+        if parts.len() >= 3 && axis_stays {
+            let mut line_ids: Vec<LineId> =
+                parts.iter().flat_map(|row| row.line_ids.iter().copied()).collect();
+            line_ids.sort_unstable();
+            rows.push(row(group, line_ids));
         }
-        let direction = group.direction;
-        rows.push(StructuralGroup {
-            group_id: GroupId(0),
-            kind: group.kind.to_owned(),
-            direction_x: Some(direction.x),
-            direction_y: Some(direction.y),
-            direction_z: Some(direction.z),
-            line_ids,
-        });
     }
     for (id, row) in (0..).zip(&mut rows) {
         row.group_id = GroupId(id);

@@ -73,14 +73,17 @@ fn the_desk_has_nine_of_its_frames() {
         // A sixth has no depth.
         assert!((0.8..0.85).contains(&images.depth.coverage()));
     }
-    // Camera, lens, depth, poses and stamps have to be right together.
+    // Camera, lens, depth, poses and stamps have to be right together. The median of a normal distribution is 0.67 of
+    // its standard deviation.
     for pair in sequence.frames.windows(2) {
         let (median, share) = disagreement(&sequence, &pair[0], &pair[1]);
         println!("{}: median {median:.2} sigma over {share:.2} of the depths", pair[0].frame_id);
-        assert!(median < 1.0 && share > 0.7, "{median} {share}");
+        assert!(median < 1.0 && share > 0.9, "{median} {share}");
     }
-    let (far, _) = disagreement(&sequence, &sequence.frames[0], &sequence.frames[8]);
-    assert!(far < 1.5, "{far}");
+    // Poses of a motion capture system wander by some millimetres. With those of 14 ms later, when the depth maps are
+    // said to have been taken, this is twice as much.
+    let (far, _) = disagreement(&sequence, &sequence.frames[0], &sequence.frames[4]);
+    assert!(far < 1.2, "{far}");
 }
 
 #[test]
@@ -96,8 +99,8 @@ fn the_cabinet_has_jpeg_pictures_and_a_camera_without_distortion() {
         sequence.frames.windows(2).map(|pair| disagreement(&sequence, &pair[0], &pair[1]).0).collect();
     medians.sort_by(f64::total_cmp);
     println!("medians {medians:.2?} sigma");
-    // The frames are 0.7 s apart and the camera goes round the cabinet: much is hidden from the next.
-    assert!(medians[29] < 2.0, "{}", medians[29]);
+    // The frames are 0.7 s and up to 0.2 m apart, and so poses matter more than the sensor: 9 mm at 1.25 m.
+    assert!(medians[29] < 3.0, "{}", medians[29]);
 }
 
 #[test]

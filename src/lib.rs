@@ -4,6 +4,9 @@
 pub mod archive;
 #[cfg(feature = "cli")]
 pub mod cli;
+pub mod datasets;
+#[cfg(feature = "fetch")]
+pub mod fetch;
 pub mod format;
 pub mod geometry;
 pub mod plot;

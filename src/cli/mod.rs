@@ -6,6 +6,8 @@ mod completions;
 mod convert;
 mod copy;
 mod explain;
+mod fetch;
+mod fetch_progress;
 mod info;
 mod left_behind;
 mod man;
@@ -53,6 +55,7 @@ enum Command {
     Stats(stats::Args),
     Plot(plot::Args),
     Schema(schema::Args),
+    Fetch(fetch::Args),
     Convert(convert::Args),
     Completions(completions::Args),
     Man(man::Args),
@@ -90,6 +93,7 @@ pub fn main() -> ExitCode {
         Command::Plot(args) => plot::run(args, &mut stdout),
         Command::Stats(args) => stats::run(args, &mut stdout),
         Command::Schema(args) => schema::run(args, &mut stdout),
+        Command::Fetch(args) => fetch::run(args, &mut stdout),
         Command::Convert(args) => convert::run(args),
         Command::Completions(args) => completions::run(args, &mut stdout),
         Command::Man(args) => man::run(args, &mut stdout),

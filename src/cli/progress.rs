@@ -12,7 +12,7 @@ const PATIENCE: Duration = Duration::from_secs(1);
 /// A bar that appears when the work turns out to be long.
 pub(super) struct Progress {
     what: String,
-    unit: &'static str,
+    template: String,
     begun: Instant,
     bar: Mutex<Option<ProgressBar>>,
 }
@@ -20,7 +20,21 @@ pub(super) struct Progress {
 impl Progress {
     /// Work on something, counted in a unit.
     pub(super) fn new(what: impl Into<String>, unit: &'static str) -> Self {
-        Self { what: what.into(), unit, begun: Instant::now(), bar: Mutex::new(None) }
+        let template =
+            format!("{{msg}} {{wide_bar}} {{human_pos}}/{{human_len}} {unit} ({{per_sec}}, {{eta}} left)");
+        Self { what: what.into(), template, begun: Instant::now(), bar: Mutex::new(None) }
+    }
+
+    /// Work on something, counted in bytes.
+    pub(super) fn bytes(what: impl Into<String>) -> Self {
+        let template =
+            "{msg} {wide_bar} {decimal_bytes}/{decimal_total_bytes} ({decimal_bytes_per_sec}, {eta} left)";
+        Self {
+            what: what.into(),
+            template: template.to_owned(),
+            begun: Instant::now(),
+            bar: Mutex::new(None),
+        }
     }
 
     /// Tells how far the work is.
@@ -31,11 +45,7 @@ impl Progress {
         let Ok(mut bar) = self.bar.lock() else { return };
         let bar = bar.get_or_insert_with(|| {
             let bar = ProgressBar::new(total);
-            let template = format!(
-                "{{msg}} {{wide_bar}} {{human_pos}}/{{human_len}} {} ({{per_sec}}, {{eta}} left)",
-                self.unit
-            );
-            if let Ok(style) = ProgressStyle::with_template(&template) {
+            if let Ok(style) = ProgressStyle::with_template(&self.template) {
                 bar.set_style(style);
             }
             bar.set_message(self.what.clone());

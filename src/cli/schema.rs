@@ -5,6 +5,7 @@ use std::io::Write;
 use anyhow::Context;
 
 use super::{Outcome, text};
+use crate::datasets;
 use crate::format;
 use crate::simulate::Recipe;
 use crate::structure::{TABLES, table_info};
@@ -17,7 +18,7 @@ use crate::validate;
   os schema point_measurements           JSON Schema of a row
   os schema point_measurements --columns types, units and spaces of the columns")]
 pub(super) struct Args {
-    /// Table name, `manifest`, `table_summaries`, `recipe` or `validation_report`; without it, all names are listed.
+    /// Table name, `manifest`, `table_summaries`, `recipe`, `dataset-recipe` or `validation_report`; without it, all names are listed.
     name: Option<String>,
     /// List the columns with type, unit, space and meaning.
     #[arg(long, requires = "name")]
@@ -35,6 +36,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
             table.add_row([info.name, sentence]);
         }
         table.add_row(["recipe", "What `os simulate` makes a sequence of."]);
+        table.add_row(["dataset-recipe", "What `os fetch` gets the images of a sequence by."]);
         table.add_row(["validation_report", "What `os validate --json` prints."]);
         writeln!(stdout, "{}", text::lines(&table))?;
         return Ok(Outcome::Done);
@@ -59,6 +61,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     let schema = match name.as_str() {
         "validation_report" => Some(validate::report_schema()),
         "recipe" => Some(Recipe::json_schema()),
+        "dataset-recipe" => Some(datasets::Recipe::json_schema()),
         name => format::json_schema(name),
     };
     let schema = schema.with_context(|| format!("there is no schema `{name}`; try `os schema`"))?;

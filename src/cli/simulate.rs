@@ -8,6 +8,7 @@ use anyhow::Context;
 
 use super::progress::{Progress, Stages};
 use super::{Outcome, render, text};
+use crate::datasets;
 use crate::format::{Encoding, Outline, WriteOptions, Written, write_two_pass};
 use crate::simulate::{self, Expected, MAX_RECIPE_BYTES, Recipe, Simulation};
 
@@ -150,6 +151,11 @@ fn refuse_existing(output: &Path, force: bool) -> anyhow::Result<()> {
 fn recipe_of(name: &str) -> anyhow::Result<(Recipe, PathBuf)> {
     let path = Path::new(name);
     if path.is_dir() || (!path.exists() && path.extension().is_none()) {
+        if datasets::names().contains(&name) {
+            anyhow::bail!(
+                "{name} is not simulated, it comes from images: `os fetch {name}` gets them and says how to convert them"
+            );
+        }
         // A name of ours goes before a folder of that name, such as an output that stands beside.
         return Ok((simulate::named(name)?, PathBuf::new()));
     }

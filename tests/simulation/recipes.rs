@@ -5,6 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
+use open_structure::datasets;
 use open_structure::format;
 use open_structure::geometry::PinholeCamera;
 use open_structure::simulate::{self, Recipe};
@@ -25,7 +26,8 @@ fn every_recipe_in_the_folder_travels_with_the_program() {
         .filter(|path| path.extension().is_some_and(|extension| extension == "toml"))
         .map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned())
         .collect();
-    let known: BTreeSet<String> = simulate::names().into_iter().map(str::to_owned).collect();
+    let known: BTreeSet<String> =
+        simulate::names().into_iter().chain(datasets::names()).map(str::to_owned).collect();
     assert_eq!(found, known);
     for name in ["box1", "box2", "corridor1", "corridor2", "sphere1", "sphere2"] {
         assert_eq!(simulate::named(name).unwrap().name, name);

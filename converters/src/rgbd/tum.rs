@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use open_structure::structure::{Clock, FrameId, registry};
 
+use super::ascending::ascending;
 use super::associate::associate;
 use super::calibration::{self, Kind, Published};
 use super::layout::{self, Dataset};
@@ -137,28 +138,13 @@ fn family(kinect: Kinect) -> &'static Family {
 
 /// Stamps and file names of a list, ascending.
 fn images(list: &List, ledger: &mut Ledger) -> Result<Vec<(i64, PathBuf)>, Error> {
-    let mut images: Vec<(i64, u64, PathBuf)> = Vec::new();
-    let mut latest = None;
+    let mut rows = Vec::new();
     for line in list.lines() {
         let stamp = line.fields.first().and_then(|field| stamp::nanos(field));
-        let Some((stamp, file)) = stamp.zip(line.file(1)) else {
-            ledger.refuse(line.wrong("timestamp filename, a file below this folder"))?;
-            continue;
-        };
-        if !ledger.keeps_going() && latest.is_some_and(|latest| latest >= stamp) {
-            return Err(line.wrong("a stamp after the one before it"));
-        }
-        latest = latest.max(Some(stamp));
-        images.push((stamp, line.number, PathBuf::from(file)));
-    }
-    images.sort_by_key(|(stamp, line, _)| (*stamp, *line));
-    let mut kept: Vec<(i64, PathBuf)> = Vec::with_capacity(images.len());
-    for (stamp, line, file) in images {
-        if kept.last().is_some_and(|(last, _)| *last == stamp) {
-            ledger.count(&list.path, "a stamp that stands there twice", 1, Some(line));
-        } else {
-            kept.push((stamp, file));
+        match stamp.zip(line.file(1).map(PathBuf::from)) {
+            Some((stamp, file)) => rows.push((stamp, line.number, file)),
+            None => ledger.refuse(line.wrong("timestamp filename, a file below this folder"))?,
         }
     }
-    Ok(kept)
+    ascending(list, rows, "stamp", ledger)
 }

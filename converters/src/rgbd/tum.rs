@@ -21,8 +21,8 @@ const STEPS_PER_METRE: f64 = 5000.0;
 /// Depths that are believed, metres: a Kinect has none below 0.4 m, and beyond 5 m its steps are wider than 7 cm.
 ///
 /// # Source
-/// Khoshelham and Elberink 2012, Accuracy and Resolution of Kinect Depth Data: errors "up to 4 cm at the maximum range of
-/// the sensor", 5 m.
+/// Khoshelham and Elberink 2012, Accuracy and Resolution of Kinect Depth Data: a random error of about 4 cm at 5 m, the end
+/// of the sensor's range, and steps of 7 cm there.
 const DEPTH_M: [f64; 2] = [0.4, 5.0];
 /// Noise of a Kinect: `σ(z) = 1.425e-3 z²`, with z in metres, and a millimetre for what is not the sensor's.
 ///
@@ -30,8 +30,7 @@ const DEPTH_M: [f64; 2] = [0.4, 5.0];
 /// `σ` = 1.9, 3.3 and 5.1 mm at 0.75, 1.25 and 1.75 m, where this says 1.8, 3.2 and 5.4 mm.
 ///
 /// # Source
-/// Khoshelham and Elberink 2012, equation 10 and table 1: `σ_Z = 2.85e-5 Z² · σ_d` in centimetres, with half a pixel of
-/// normalised disparity for `σ_d`.
+/// Khoshelham and Elberink 2012: `σ_Z = 2.85e-5 Z² σ_d` in centimetres, with half a unit of disparity for `σ_d`.
 const NOISE: DepthNoise = DepthNoise { constant_m: 1e-3, ..KINECT_NOISE };
 /// Noise of a Kinect without anything else but the steps of the file.
 pub(super) const KINECT_NOISE: DepthNoise =

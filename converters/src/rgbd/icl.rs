@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use open_structure::structure::{Clock, FrameId, registry};
 
+use super::ascending::ascending;
 use super::calibration::{self, Kind, Published};
 use super::layout::{self, Dataset};
 use super::list::List;
@@ -163,8 +164,7 @@ fn number(text: &str) -> Option<i64> {
 
 /// What a list names: number and file of the depth map, number and file of the picture, or the other way round.
 fn associated(list: &List, ledger: &mut Ledger) -> Result<Vec<Numbered>, Error> {
-    let mut images: Vec<(u64, Numbered)> = Vec::new();
-    let mut latest = None;
+    let mut rows = Vec::new();
     for line in list.lines() {
         let numbers = [0, 2].map(|field: usize| line.fields.get(field).and_then(|text| number(text)));
         let files = line.file(1).zip(line.file(3));
@@ -175,22 +175,10 @@ fn associated(list: &List, ledger: &mut Ledger) -> Result<Vec<Numbered>, Error> 
         let swapped = files.0.trim_start_matches("./").starts_with("rgb");
         let (number, colour, depth) =
             if swapped { (first, files.0, files.1) } else { (second, files.1, files.0) };
-        if !ledger.keeps_going() && latest.is_some_and(|latest| latest >= number) {
-            return Err(line.wrong("a number after the one before it"));
-        }
-        latest = latest.max(Some(number));
-        images.push((line.number, Numbered { number, colour: colour.into(), depth: depth.into() }));
+        let image = Numbered { number, colour: colour.into(), depth: depth.into() };
+        rows.push((number, line.number, image));
     }
-    images.sort_by_key(|(line, image)| (image.number, *line));
-    let mut kept: Vec<Numbered> = Vec::with_capacity(images.len());
-    for (line, image) in images {
-        if kept.last().is_some_and(|last| last.number == image.number) {
-            ledger.count(&list.path, "a number that stands there twice", 1, Some(line));
-        } else {
-            kept.push(image);
-        }
-    }
-    Ok(kept)
+    Ok(ascending(list, rows, "number", ledger)?.into_iter().map(|(_, image)| image).collect())
 }
 
 /// What the folders hold, by number.

@@ -9,8 +9,8 @@ use open_structure::structure::SourceFile;
 use super::Error;
 use crate::text_release::provenance_of_bytes;
 
-/// Bytes of the largest list that is read: a million lines of poses with all digits.
-const MAX_BYTES: u64 = 1 << 28;
+/// Bytes of the largest list that is read: several hundred thousand poses.
+const MAX_BYTES: u64 = 1 << 26;
 /// Characters of a line that an error shows.
 const SHOWN: usize = 60;
 
@@ -61,6 +61,14 @@ impl List {
         })
     }
 
+    /// The error that says what should stand in a line.
+    ///
+    /// * `number` — the line, counted from 1.
+    pub(super) fn wrong(&self, number: u64, expected: impl ToString) -> Error {
+        let line = usize::try_from(number.saturating_sub(1)).unwrap_or(usize::MAX);
+        wrong(&self.path, number, self.text.lines().nth(line).unwrap_or_default().trim(), expected)
+    }
+
     /// Remarks: lines that begin with `#`.
     pub(super) fn remarks(&self) -> impl Iterator<Item = &str> {
         self.text.lines().filter_map(|text| text.trim().strip_prefix('#'))
@@ -70,11 +78,7 @@ impl List {
 impl Line<'_> {
     /// The error that says what should stand in this line.
     pub(super) fn wrong(&self, expected: impl ToString) -> Error {
-        let mut found: String = self.text.chars().take(SHOWN).collect();
-        if found.len() < self.text.len() {
-            found.push_str(" ...");
-        }
-        Error::line(self.path, self.number, expected, format!("\"{found}\""))
+        wrong(self.path, self.number, self.text, expected)
     }
 
     /// The numbers of fields, all finite.
@@ -96,6 +100,14 @@ impl Line<'_> {
             Path::new(name).components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
         inside.then_some(name)
     }
+}
+
+fn wrong(path: &Path, number: u64, text: &str, expected: impl ToString) -> Error {
+    let mut found: String = text.chars().take(SHOWN).collect();
+    if found.len() < text.len() {
+        found.push_str(" ...");
+    }
+    Error::line(path, number, expected, format!("\"{found}\""))
 }
 
 /// Bytes of a file; `None` where there are more than expected.

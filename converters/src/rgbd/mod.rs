@@ -3,6 +3,7 @@
 //! Each dataset is one file, whose `open` gives a [`RawSequence`]: every frame with its stamp, its true pose and
 //! the names of its files. Images are read one frame at a time by [`RawSequence::images`].
 
+mod ascending;
 mod associate;
 mod calibration;
 mod depth_file;

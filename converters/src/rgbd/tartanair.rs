@@ -19,7 +19,7 @@ const EXPECTED: &str = "image_left/, depth_left/ and pose_left.txt of TartanAir 
 /// Frames in a second: the dataset has no stamps, and its simulated inertial sensor runs at 100 Hz with ten samples from
 /// an image to the next.
 const RATE_HZ: i64 = 10;
-/// Depths that are believed, metres. The engine writes 16-bit floating point numbers: beyond 50 m their steps are 3 cm and
+/// Depths that are believed, metres. The engine draws nothing nearer than 10 cm and writes 16-bit floating point numbers: beyond 50 m their steps are 3 cm and
 /// pixels 16 cm wide; the sky is at 10000 m and more. No landmark that the first release has of the first 60 frames
 /// of `hospital` is farther than 46 m.
 const DEPTH_M: [f64; 2] = [0.1, 50.0];
@@ -154,8 +154,9 @@ fn name(root: &Path) -> String {
     let own = layout::name(root);
     let full = root.canonicalize().unwrap_or_else(|_| root.to_owned());
     let above: Vec<String> = full.ancestors().skip(1).take(2).map(layout::name).collect();
-    let numbered =
-        own.strip_prefix('P').is_some_and(|rest| rest.len() == 3 && rest.bytes().all(|c| c.is_ascii_digit()));
+    let numbered = own
+        .strip_prefix('P')
+        .is_some_and(|rest| (3..=4).contains(&rest.len()) && rest.bytes().all(|c| c.is_ascii_digit()));
     match above.as_slice() {
         [level, environment] if numbered && is_level(level) => format!("{environment}_{level}_{own}"),
         _ => own,

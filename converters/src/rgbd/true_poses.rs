@@ -2,6 +2,7 @@
 
 use open_structure::geometry::Pose;
 
+use super::ascending::ascending;
 use super::list::{Line, List};
 use super::{Error, Ledger, stamp};
 
@@ -25,30 +26,15 @@ impl TruePoses {
     /// [`Error::Line`] for what is no pose, and for stamps that do not ascend, unless lines may be left out: then the
     /// poses are sorted, and of equal stamps the first counts.
     pub(super) fn read(list: &List, ledger: &mut Ledger) -> Result<Self, Error> {
-        let mut rows: Vec<(i64, u64, Pose)> = Vec::new();
-        let mut latest = None;
+        let mut rows = Vec::new();
         for line in list.lines() {
             let stamp = line.fields.first().and_then(|field| stamp::nanos(field));
-            let Some((stamp, pose)) = stamp.zip(pose(&line, 1)) else {
-                ledger.refuse(line.wrong(WITH_STAMP))?;
-                continue;
-            };
-            if !ledger.keeps_going() && latest.is_some_and(|latest| latest >= stamp) {
-                return Err(line.wrong("a stamp after the one before it"));
-            }
-            latest = latest.max(Some(stamp));
-            rows.push((stamp, line.number, pose));
-        }
-        rows.sort_by_key(|(stamp, line, _)| (*stamp, *line));
-        let mut kept: Vec<(i64, Pose)> = Vec::with_capacity(rows.len());
-        for (stamp, line, pose) in rows {
-            if kept.last().is_some_and(|(last, _)| *last == stamp) {
-                ledger.count(&list.path, "a stamp that stands there twice", 1, Some(line));
-            } else {
-                kept.push((stamp, pose));
+            match stamp.zip(pose(&line, 1)) {
+                Some((stamp, pose)) => rows.push((stamp, line.number, pose)),
+                None => ledger.refuse(line.wrong(WITH_STAMP))?,
             }
         }
-        Ok(Self { rows: kept })
+        Ok(Self { rows: ascending(list, rows, "stamp", ledger)? })
     }
 
     /// The pose at a stamp: one that stands there, or one between its neighbours, the rotation at constant speed.

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use open_structure::structure::{Clock, FrameId, registry};
 
+use super::ascending::ascending;
 use super::associate::associate;
 use super::calibration::{self, Kind, Published};
 use super::layout::{self, Dataset};
@@ -20,8 +21,8 @@ const STEPS_PER_METRE: f64 = 5000.0;
 /// Depths that are believed, metres: a Kinect has none below 0.4 m, and beyond 5 m its steps are wider than 7 cm.
 ///
 /// # Source
-/// Khoshelham and Elberink 2012, Accuracy and Resolution of Kinect Depth Data: errors "up to 4 cm at the maximum range of
-/// the sensor", 5 m.
+/// Khoshelham and Elberink 2012, Accuracy and Resolution of Kinect Depth Data: a random error of about 4 cm at 5 m, the end
+/// of the sensor's range, and steps of 7 cm there.
 const DEPTH_M: [f64; 2] = [0.4, 5.0];
 /// Noise of a Kinect: `σ(z) = 1.425e-3 z²`, with z in metres, and a millimetre for what is not the sensor's.
 ///
@@ -29,8 +30,7 @@ const DEPTH_M: [f64; 2] = [0.4, 5.0];
 /// `σ` = 1.9, 3.3 and 5.1 mm at 0.75, 1.25 and 1.75 m, where this says 1.8, 3.2 and 5.4 mm.
 ///
 /// # Source
-/// Khoshelham and Elberink 2012, equation 10 and table 1: `σ_Z = 2.85e-5 Z² · σ_d` in centimetres, with half a pixel of
-/// normalised disparity for `σ_d`.
+/// Khoshelham and Elberink 2012: `σ_Z = 2.85e-5 Z² σ_d` in centimetres, with half a unit of disparity for `σ_d`.
 const NOISE: DepthNoise = DepthNoise { constant_m: 1e-3, ..KINECT_NOISE };
 /// Noise of a Kinect without anything else but the steps of the file.
 pub(super) const KINECT_NOISE: DepthNoise =
@@ -144,28 +144,13 @@ fn family(kinect: Kinect) -> &'static Family {
 
 /// Stamps and file names of a list, ascending.
 fn images(list: &List, ledger: &mut Ledger) -> Result<Vec<(i64, PathBuf)>, Error> {
-    let mut images: Vec<(i64, u64, PathBuf)> = Vec::new();
-    let mut latest = None;
+    let mut rows = Vec::new();
     for line in list.lines() {
         let stamp = line.fields.first().and_then(|field| stamp::nanos(field));
-        let Some((stamp, file)) = stamp.zip(line.file(1)) else {
-            ledger.refuse(line.wrong("timestamp filename, a file below this folder"))?;
-            continue;
-        };
-        if !ledger.keeps_going() && latest.is_some_and(|latest| latest >= stamp) {
-            return Err(line.wrong("a stamp after the one before it"));
-        }
-        latest = latest.max(Some(stamp));
-        images.push((stamp, line.number, PathBuf::from(file)));
-    }
-    images.sort_by_key(|(stamp, line, _)| (*stamp, *line));
-    let mut kept: Vec<(i64, PathBuf)> = Vec::with_capacity(images.len());
-    for (stamp, line, file) in images {
-        if kept.last().is_some_and(|(last, _)| *last == stamp) {
-            ledger.count(&list.path, "a stamp that stands there twice", 1, Some(line));
-        } else {
-            kept.push((stamp, file));
+        match stamp.zip(line.file(1).map(PathBuf::from)) {
+            Some((stamp, file)) => rows.push((stamp, line.number, file)),
+            None => ledger.refuse(line.wrong("timestamp filename, a file below this folder"))?,
         }
     }
-    Ok(kept)
+    ascending(list, rows, "stamp", ledger)
 }

@@ -106,7 +106,7 @@ fn a_bad_line_is_told_by_its_number_or_left_out_and_counted() {
         (
             Layout::IclOriginal,
             "scene_00_0001.txt",
-            &|text| text.replace("cam_up       = [", "cam_up       = ["  ).replace("cam_up", "cam_down"),
+            &|text| text.replace("cam_up", "cam_down"),
             "/scene_00_0001.txt:1: expected cam_pos, cam_dir and cam_up = [x, y, z]', found not all of them".to_owned(),
             4,
         ),

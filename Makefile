@@ -59,4 +59,4 @@ conformance-corpus:
 spec:
 	cargo build --workspace --bins --locked
 	UPDATE_SPEC=1 UPDATE_SAMPLE=1 UPDATE_README=1 cargo test --workspace --locked \
-	  --test spec_sync --test sample_sequence --test readme --test simulation
+	  --test spec_sync --test sample_sequence --test readme --test simulation --test fetch

@@ -53,7 +53,7 @@ const LIBRARIES: &[(&[&str], &[&str], &str)] = &[
     (&["ureq"], &["src/fetch/"], "the network is the business of the room `fetch`"),
     (
         &["tar", "flate2", "zip"],
-        &["src/archive/", "converters/src/text_release/"],
+        &["src/archive/", "src/simulate/trajectory/tests/", "converters/src/text_release/"],
         "archives are the business of the room `archive`",
     ),
     (

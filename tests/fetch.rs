@@ -363,7 +363,7 @@ fn a_silent_server_is_left_after_a_time_and_asked_again() {
 fn another_run_goes_on_where_the_last_one_ended() {
     let case = Case::new(&[Manner::Cut(1000), Manner::Cut(0)]);
     let error = case.refused();
-    assert!(matches!(error, Error::Connection { attempts: 3, .. }), "{error}");
+    assert!(matches!(error, Error::Connection { attempts: 3, kept: 1000, .. }), "{error}");
     assert_eq!(case.downloads(), ["small.tar.part", "small.tar.part.json"]);
     assert_eq!(case.names(), ["out.download"]);
     case.server.asked();
@@ -401,6 +401,18 @@ fn a_file_that_has_changed_meanwhile_starts_over() {
     assert!(matches!(unpinned.refused(), Error::Connection { .. }));
     unpinned.server.put("/small.tar", &unpinned.archive, &[Manner::Whole]);
     assert_eq!(unpinned.done(), ["started over"]);
+}
+
+#[test]
+fn one_file_is_downloaded_by_one_process_at_a_time() {
+    let case = Case::new(&[Manner::Whole]);
+    let downloads = fetch::download_folder(&case.out());
+    fs::create_dir(&downloads).unwrap();
+    let other = fs::File::create(downloads.join("small.tar.part")).unwrap();
+    other.lock().unwrap();
+    assert!(matches!(case.refused(), Error::Busy { .. }));
+    drop(other);
+    assert!(case.done().is_empty());
 }
 
 #[test]
@@ -580,12 +592,7 @@ fn an_archive_without_the_folder_leaves_no_folder() {
 }
 
 fn os(arguments: &[&str], folder: &Path) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_os"));
-    command.args(arguments).current_dir(folder);
-    for variable in ["http_proxy", "HTTP_PROXY", "https_proxy", "HTTPS_PROXY", "all_proxy", "ALL_PROXY"] {
-        command.env_remove(variable);
-    }
-    command.output().unwrap()
+    Command::new(env!("CARGO_BIN_EXE_os")).args(arguments).current_dir(folder).output().unwrap()
 }
 
 #[track_caller]

@@ -1,7 +1,7 @@
 //! A reader that counts, and stops where there is too much.
 
 use std::cell::Cell;
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io::{self, Read};
 
 /// Counts what is read of a file, and tells it.
 pub(super) struct Watched<'a, R> {
@@ -23,12 +23,6 @@ impl<R: Read> Read for Watched<'_, R> {
         self.read += length as u64;
         (self.progress)(self.read.min(self.total), self.total);
         Ok(length)
-    }
-}
-
-impl<R: Seek> Seek for Watched<'_, R> {
-    fn seek(&mut self, position: SeekFrom) -> io::Result<u64> {
-        self.inner.seek(position)
     }
 }
 

@@ -94,11 +94,14 @@ pub fn extract(
     let archive_bytes = file.metadata().map_err(Error::io(archive))?.len();
     let mut sink = Sink::new(archive, kind, folder, selection, limits, archive_bytes);
     // The buffer is outermost: the readers of headers ask for a few bytes at a time.
-    let file = BufReader::with_capacity(1 << 17, Watched::new(file, archive_bytes, progress));
+    let buffered = |file| BufReader::with_capacity(1 << 17, Watched::new(file, archive_bytes, progress));
     match kind {
-        Kind::Zip => zip_archive::extract(file, &mut sink)?,
-        Kind::Tar => tar_archive::extract(file, &mut sink)?,
-        Kind::TarGz => tar_archive::extract(flate2::bufread::MultiGzDecoder::new(file), &mut sink)?,
+        // Small, for the headers are far apart.
+        Kind::Zip => zip_archive::extract(BufReader::new(file), archive_bytes, progress, &mut sink)?,
+        Kind::Tar => tar_archive::extract(buffered(file), &mut sink)?,
+        Kind::TarGz => {
+            tar_archive::extract(flate2::bufread::MultiGzDecoder::new(buffered(file)), &mut sink)?;
+        }
     }
     sink.finish()
 }

@@ -15,7 +15,14 @@ use super::sink::{EntryKind, Sink};
 const TYPE_OF_MODE: u32 = 0o170_000;
 
 /// Unpacks a zip archive.
-pub(super) fn extract(reader: impl Read + Seek, sink: &mut Sink<'_>) -> Result<(), Error> {
+///
+/// * `progress` — told bytes of the archive that the entries so far take, and all.
+pub(super) fn extract(
+    reader: impl Read + Seek,
+    archive_bytes: u64,
+    progress: &dyn Fn(u64, u64),
+    sink: &mut Sink<'_>,
+) -> Result<(), Error> {
     let mut archive = ZipArchive::new(reader).map_err(|error| damaged(sink, None, error))?;
     if archive.len() as u64 > sink.limits.entries {
         return Err(sink.too_much("entries", sink.limits.entries));
@@ -28,9 +35,12 @@ pub(super) fn extract(reader: impl Read + Seek, sink: &mut Sink<'_>) -> Result<(
         return Err(damaged(sink, None, ZipError::InvalidArchive("entries share bytes".into())));
     }
     let (left, zeros) = (Cell::new(sink.permitted), Cell::new(0));
+    let mut done: u64 = 0;
     for index in 0..archive.len() {
+        progress(done.min(archive_bytes), archive_bytes);
         let about = archive.by_index_data(index).map_err(|error| damaged(sink, None, error))?;
         let name = about.name_raw().to_owned();
+        done = done.saturating_add(about.compressed_size());
         let kind = match about.unix_mode().map_or(0, |mode| mode & TYPE_OF_MODE) {
             _ if name.ends_with(b"/") => EntryKind::Folder,
             0 | 0o100_000 => EntryKind::File,

@@ -49,6 +49,9 @@ impl Progress {
                 bar.set_style(style);
             }
             bar.set_message(self.what.clone());
+            // What is done already, in an earlier run perhaps, tells nothing of the speed from here.
+            bar.set_position(done);
+            bar.reset_eta();
             bar
         });
         bar.set_length(total);

@@ -81,16 +81,11 @@ impl Download<'_> {
             };
             failed = if part.length() > before { 1 } else { failed + 1 };
             if failed >= self.patience.attempts.max(1) {
-                if part.length() == 0 {
+                let (url, file, kept) = (url.to_owned(), self.name().to_owned(), part.length());
+                if kept == 0 {
                     part.discard()?;
                 }
-                let file = self.name().to_owned();
-                return Err(Error::Connection {
-                    url: url.to_owned(),
-                    file,
-                    detail: reason,
-                    attempts: failed,
-                });
+                return Err(Error::Connection { url, file, detail: reason, attempts: failed, kept });
             }
             let wait = self.patience.wait(failed, asked);
             self.tell(Event::Failed { file: self.name(), reason: &reason, wait });
@@ -212,6 +207,7 @@ impl Download<'_> {
                     file: self.name().to_owned(),
                     detail: error.to_string(),
                     attempts: 1,
+                    kept: 0,
                 });
             }
             other => other.to_string(),

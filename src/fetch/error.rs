@@ -30,9 +30,7 @@ pub enum Error {
         reason: Option<&'static str>,
     },
     /// The server cannot be reached, or does not keep to HTTP, however often it is asked.
-    #[error(
-        "{url}: {detail}; given up after {attempts} attempts in vain, what came of {file} is kept for the next run"
-    )]
+    #[error("{url}: {detail}; attempts in vain: {attempts}{}", what_is_kept(file, *kept))]
     Connection {
         /// Where.
         url: String,
@@ -42,6 +40,8 @@ pub enum Error {
         detail: String,
         /// How often it was tried.
         attempts: u32,
+        /// Bytes of the file that came, which the next run goes on after.
+        kept: u64,
     },
     /// The file has another length than it should.
     #[error("{place}: expected {expected} B of {file}, found {found} B")]
@@ -118,6 +118,11 @@ pub enum Error {
         /// The file.
         path: PathBuf,
     },
+}
+
+/// What is said of a download that may go on.
+fn what_is_kept(file: &str, bytes: u64) -> String {
+    if bytes == 0 { String::new() } else { format!("; {bytes} B of {file} are kept for the next run") }
 }
 
 impl Error {

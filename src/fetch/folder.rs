@@ -148,7 +148,8 @@ pub fn fetch(
     if !options.keep_archives {
         downloads.remove(part)?;
     }
-    Ok(Fetched { sequence, folder: into.join(folder), into, files: fetched })
+    let folder = if folder.as_os_str().is_empty() { into.clone() } else { into.join(folder) };
+    Ok(Fetched { sequence, folder, into, files: fetched })
 }
 
 /// The folder to convert, below the one that is made; empty for that itself.

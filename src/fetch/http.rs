@@ -63,6 +63,9 @@ impl Client {
     /// Asks for a file from a byte on, provided that it is still the same version.
     pub(super) fn ask(&self, url: &str, from: u64, version: &Version) -> Result<Answer, ureq::Error> {
         let mut request = self.agent.get(url);
+        if is_this_machine(url) {
+            request = request.config().proxy(None).build();
+        }
         if let (1.., Some(validator)) = (from, version.validator()) {
             request = request.header("Range", format!("bytes={from}-")).header("If-Range", validator);
         }
@@ -95,6 +98,14 @@ impl Client {
     }
 }
 
+/// Whether a server is on this machine, which no proxy can reach for us.
+fn is_this_machine(url: &str) -> bool {
+    let host = url.split("://").nth(1).unwrap_or_default();
+    ["localhost", "127.0.0.1", "[::1]"].into_iter().any(|name| {
+        host.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with([':', '/']))
+    })
+}
+
 fn text<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
     headers.get(name).and_then(|value| value.to_str().ok()).filter(|value| value.len() <= 1000)
 }
@@ -110,6 +121,16 @@ fn content_range(value: &str) -> Option<(u64, Option<u64>)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn this_machine_is_known_by_its_names() {
+        for url in ["http://localhost", "http://127.0.0.1:80/a", "https://localhost/a", "http://[::1]:8/a"] {
+            assert!(is_this_machine(url), "{url}");
+        }
+        for url in ["http://localhost.example.org/", "http://127.0.0.12/", "http://example.org/localhost"] {
+            assert!(!is_this_machine(url), "{url}");
+        }
+    }
 
     #[test]
     fn a_content_range_says_where_and_how_much() {

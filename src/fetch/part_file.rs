@@ -49,11 +49,9 @@ impl PartFile {
             .truncate(false)
             .open(&path)
             .map_err(Error::io(&path))?;
-        match file.try_lock() {
-            Ok(()) => {}
-            Err(TryLockError::WouldBlock) => return Err(Error::Busy { path }),
-            // Where files cannot be locked, whoever starts two downloads of one file has to know.
-            Err(TryLockError::Error(_)) => {}
+        // Where files cannot be locked, whoever starts two downloads of one file has to know.
+        if let Err(TryLockError::WouldBlock) = file.try_lock() {
+            return Err(Error::Busy { path });
         }
         let mut part = Self { path, file, digest: Sha256::new(), length: 0, known: Known::of(whole) };
         part.length = checksum::add(&part.file, &mut part.digest).map_err(Error::io(&part.path))?;

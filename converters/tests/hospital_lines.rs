@@ -3,21 +3,20 @@
 //! They are looked for in `../shared/data` beside the workspace, or where `OPEN_STRUCTURE_DATA` says.
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-use nalgebra::{Matrix3, Point2, Point3, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion};
 use open_structure::geometry::{PinholeCamera, Pose, Segment};
 use open_structure::simulate::Random;
 use open_structure::structure::{Camera, CameraId, registry};
 use open_structure_converters::associate::{
-    GroupOptions, LineMap, LineOptions, Rejected, Rims, group_lines, lift, visible_part,
+    Group, GroupOptions, LineMap, LineOptions, Rims, group_lines, lift, visible_part,
 };
 use open_structure_converters::detect::{Detector, SegmentOptions, segments};
 use open_structure_converters::rgbd::{DepthMap, DepthNoise, Raster};
 use open_structure_converters::text_release::{Limits, discover, read};
 use opencv::imgcodecs::{IMREAD_GRAYSCALE, imread};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-const FRAMES: usize = 60;
 /// Half precision of the depth files.
 const NOISE: DepthNoise = DepthNoise { constant_m: 1e-3, linear: 5e-4, quadratic_per_m: 0.0 };
 
@@ -50,7 +49,7 @@ fn poses(data: &Path) -> Vec<Pose> {
     text.lines().map(pose).collect()
 }
 
-fn depth(data: &Path, frame: usize) -> DepthMap {
+fn depth(data: &Path, frame: u32) -> DepthMap {
     let name = format!("rgbd/tartanair_hospital_60/depth_left/{frame:06}_left_depth.npy");
     let bytes = std::fs::read(data.join(name)).unwrap();
     let depth: Vec<f32> = npyz::NpyFile::new(&bytes[..]).unwrap().into_vec().unwrap();
@@ -59,34 +58,16 @@ fn depth(data: &Path, frame: usize) -> DepthMap {
     map
 }
 
-struct Published {
-    lines: Vec<Segment>,
-    /// As observed in frames 0..59, one per line: the longest.
-    observed: Vec<Segment>,
-}
-
-fn published(data: &Path, poses: &[Pose]) -> Published {
+/// The published lines that some of the frames show.
+fn published(data: &Path, poses: &[Pose]) -> Vec<Segment> {
     let limits = Limits::default();
     let found = discover(&[data.join("open-structure/hospital")], &limits).unwrap();
     let sequence = read(&found.sequences[0], &limits).unwrap();
-    let landmarks: BTreeMap<i64, Segment> = sequence.line_landmarks[0]
-        .segments
-        .iter()
-        .map(|line| (line.id, Segment { start: line.start.into(), end: line.end.into() }))
-        .collect();
-    let camera = *raster().camera();
-    let mut seen: BTreeMap<i64, Segment> = BTreeMap::new();
-    for row in &sequence.association.as_ref().unwrap().rows.line_observations {
-        let Some(pose) = usize::try_from(row.frame).ok().and_then(|frame| poses.get(frame)) else { continue };
-        let point = |[u, v, d]: [f64; 3]| pose * camera.back_project(Point2::new(u, v), d);
-        let view = Segment { start: point(row.start), end: point(row.end) };
-        let best = seen.entry(row.line).or_insert(view);
-        if view.length() > best.length() {
-            *best = view;
-        }
-    }
-    let seen: BTreeMap<_, _> = seen.into_iter().filter(|(id, _)| landmarks.contains_key(id)).collect();
-    Published { lines: seen.keys().map(|id| landmarks[id]).collect(), observed: seen.into_values().collect() }
+    let rows = &sequence.association.as_ref().unwrap().rows.line_observations;
+    let shown = |frame: i64| usize::try_from(frame).is_ok_and(|frame| frame < poses.len());
+    let seen: BTreeSet<i64> = rows.iter().filter(|row| shown(row.frame)).map(|row| row.line).collect();
+    let landmarks = sequence.line_landmarks[0].segments.iter().filter(|line| seen.contains(&line.id));
+    landmarks.map(|line| Segment { start: line.start.into(), end: line.end.into() }).collect()
 }
 
 /// Whether two lines are one: at most an angle apart, and at most a distance where they run side by side.
@@ -102,119 +83,87 @@ fn same(a: &Segment, b: &Segment, angle_deg: f64, distance_m: f64) -> bool {
     from < to && [from, to].iter().all(|at| other.distance_to_point(a.start + direction * *at) <= distance_m)
 }
 
+/// Part of some lines that others have, within 1 degree and 3 cm.
 fn share(of: &[Segment], among: &[Segment]) -> f64 {
     let found = of.iter().filter(|line| among.iter().any(|other| same(line, other, 1.0, 0.03))).count();
     found as f64 / of.len() as f64
 }
 
+/// Lines of the frames, seen in three of them at least, before and after they were grouped.
 struct Found {
     lines: Vec<Segment>,
     grouped: Vec<Segment>,
+    groups: Vec<Group>,
 }
 
-fn convert(
-    data: &Path,
-    poses: &[Pose],
-    detection: &SegmentOptions,
-    options: &LineOptions,
-    grouping: &GroupOptions,
-    least_views: usize,
-) -> Found {
+fn convert(data: &Path, poses: &[Pose], detection: &SegmentOptions, options: &LineOptions) -> Found {
     let raster = raster();
-    let clock = std::time::Instant::now();
     let mut map = LineMap::new(options);
-    let mut rejected: BTreeMap<Rejected, usize> = BTreeMap::new();
-    let (mut detected, mut lifted) = (0, 0);
-    let mut spent = [0.0; 5];
-    for (frame, pose) in poses.iter().enumerate() {
-        let start = std::time::Instant::now();
+    for (frame, pose) in (0..).zip(poses) {
         let name = format!("rgbd/tartanair_hospital_60/image_left/{frame:06}_left.png");
         let grey = imread(data.join(name).to_str().unwrap(), IMREAD_GRAYSCALE).unwrap();
         let depth = depth(data, frame);
-        spent[0] += start.elapsed().as_secs_f64();
-        let start = std::time::Instant::now();
-        let found = segments(&grey, detection).unwrap();
-        spent[1] += start.elapsed().as_secs_f64();
-        let start = std::time::Instant::now();
-        detected += found.len();
-        let mut random = Random::new(1, "lines", frame as u64);
-        let mut lines = Vec::new();
-        for segment in found {
-            match lift(&raster, &depth, pose, segment, &NOISE, options, &mut random) {
-                Ok(line) => lines.push(line),
-                Err(reason) => *rejected.entry(reason).or_default() += 1,
-            }
-        }
-        spent[2] += start.elapsed().as_secs_f64();
-        let start = std::time::Instant::now();
-        lifted += lines.len();
-        map.add(u32::try_from(frame).unwrap(), &lines);
-        spent[3] += start.elapsed().as_secs_f64();
+        let mut random = Random::new(1, "lines", u64::from(frame));
+        let lines: Vec<_> = segments(&grey, detection)
+            .unwrap()
+            .into_iter()
+            .filter_map(|segment| lift(&raster, &depth, pose, segment, &NOISE, options, &mut random).ok())
+            .collect();
+        map.add(frame, &lines);
     }
-    let before = map.len();
-    let candidates = map.finish();
-    let kept: Vec<Segment> =
-        candidates.iter().filter(|line| line.frames.len() >= least_views).map(|line| line.segment).collect();
-    let mut grouped = kept.clone();
-    let groups = group_lines(&mut grouped, grouping);
-    let start = std::time::Instant::now();
+    let lines: Vec<Segment> =
+        map.finish().iter().filter(|line| line.frames.len() >= 3).map(|line| line.segment).collect();
+    let mut grouped = lines.clone();
+    let groups = group_lines(&mut grouped, &GroupOptions::default());
     let mut views = vec![0; grouped.len()];
-    for (frame, pose) in poses.iter().enumerate() {
+    for (frame, pose) in (0..).zip(poses) {
         let depth = depth(data, frame);
         for (line, views) in grouped.iter().zip(&mut views) {
-            if visible_part(&raster, &depth, &NOISE, &pose.inverse(), line, options).is_some() {
-                *views += 1;
-            }
+            let seen = visible_part(&raster, &depth, &NOISE, &pose.inverse(), line, options);
+            *views += usize::from(seen.is_some());
         }
     }
-    spent[4] += start.elapsed().as_secs_f64();
-    let lines: Vec<_> =
-        kept.iter().zip(&views).filter(|(_, n)| **n >= least_views).map(|(l, _)| *l).collect();
-    let grouped: Vec<_> =
-        grouped.iter().zip(&views).filter(|(_, n)| **n >= least_views).map(|(l, _)| *l).collect();
-    println!(
-        "detected {detected}, lifted {lifted}, rejected {rejected:?}, landmarks {before} -> {} -> {} -> {}, views {}, {:.1} s {spent:.2?}",
-        candidates.len(),
-        kept.len(),
-        grouped.len(),
-        views.iter().sum::<usize>(),
-        clock.elapsed().as_secs_f64()
-    );
-    for group in groups.iter().take(4).chain(groups.iter().filter(|g| g.kind != registry::PARALLEL)) {
-        println!("  {} of {} {:.3?}", group.kind, group.members.len(), group.direction.as_slice());
-    }
-    Found { lines, grouped }
+    let seen = |place: usize| views[place] >= 3;
+    let dropped = (0..lines.len()).filter(|place| !seen(*place)).count();
+    assert_eq!(dropped, 0, "a line that was detected in three frames is seen in three");
+    Found { lines, grouped, groups }
 }
 
 #[test]
-fn explore() {
+fn most_of_the_published_lines_are_found_again() {
     let Some(data) = data() else { return };
     let poses = poses(&data);
     let published = published(&data, &poses);
-    println!("published {} lines", published.lines.len());
-    let lengths = |lines: &[Segment]| {
-        let mut all: Vec<f64> = lines.iter().map(Segment::length).collect();
-        all.sort_by(f64::total_cmp);
-        format!("{:.2} {:.2} {:.2}", all[all.len() / 10], all[all.len() / 2], all[all.len() * 9 / 10])
-    };
-    println!("lengths {} / {}", lengths(&published.lines), lengths(&published.observed));
-    println!("published turned against observed {:.3}", share(&published.lines, &published.observed));
+    assert_eq!(published.len(), 39);
     for detector in [Detector::Fld, Detector::Lsd] {
         for rims in [Rims::Nearer, Rims::Reject] {
             let detection = SegmentOptions { detector, ..SegmentOptions::default() };
             let options = LineOptions { rims, ..LineOptions::default() };
-            let found = convert(&data, &poses, &detection, &options, &GroupOptions::default(), 3);
+            let Found { lines, grouped, groups } = convert(&data, &poses, &detection, &options);
+            let found = [share(&published, &lines), share(&published, &grouped)];
+            let ours = [share(&lines, &published), share(&grouped, &published)];
             println!(
-                "{detector:?} {rims:?}: published found {:.3} (grouped {:.3}; as observed {:.3}, grouped {:.3}); ours published {:.3} (grouped {:.3}, as observed {:.3})",
-                share(&published.lines, &found.lines),
-                share(&published.lines, &found.grouped),
-                share(&published.observed, &found.lines),
-                share(&published.observed, &found.grouped),
-                share(&found.lines, &published.lines),
-                share(&found.grouped, &published.lines),
-                share(&found.lines, &published.observed),
+                "{detector:?} {rims:?}: of {} published lines {:.1} % are found, {:.1} % when grouped; of {} found lines {:.1} % are published, {:.1} % when grouped",
+                published.len(),
+                found[0] * 100.0,
+                found[1] * 100.0,
+                lines.len(),
+                ours[0] * 100.0,
+                ours[1] * 100.0
             );
+            // Of 39 lines: 36 by default, 33 without those on rims. The published ones were chosen by hands that did not say how.
+            let least = if rims == Rims::Nearer { 0.85 } else { 0.75 };
+            assert!(found[0] >= least && found[1] >= least, "{detector:?} {rims:?} {found:?}");
+            assert!(ours[0] >= 0.25 && ours[1] >= 0.25, "{detector:?} {rims:?} {ours:?}");
+            // A hospital's corridor is a Manhattan world, with its axes along those of the rendered world.
+            let manhattan = groups.iter().find(|group| group.kind == registry::MANHATTAN).unwrap();
+            assert!(
+                manhattan.members.len() * 10 >= lines.len() * 7,
+                "{} of {}",
+                manhattan.members.len(),
+                lines.len()
+            );
+            assert!(manhattan.direction.amax() > 0.9999, "{}", manhattan.direction);
         }
     }
-    let _ = (Vector3::<f64>::zeros(), BTreeSet::<u8>::new());
 }

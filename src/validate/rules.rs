@@ -320,10 +320,12 @@ mod tests {
 
     #[test]
     fn a_file_is_held_against_the_rules_of_its_version() {
-        assert_eq!(rules_for("1.0.0").len(), RULES.len());
+        assert_eq!(rules_for("1.0.0").len(), 59);
+        let later = |version: &str| rules_for(version).iter().any(|rule| rule.id == "group-of-groups");
+        assert!(!later("1.1.0") && later("1.2.0"));
         assert_eq!(rules_for("1.7.3").len(), RULES.len());
         assert!(rules_for("2.0.0").is_empty());
-        assert_eq!(rules_for("nonsense").len(), RULES.len());
+        assert_eq!(rules_for("nonsense").len(), 59);
     }
 
     #[test]

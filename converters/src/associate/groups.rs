@@ -206,3 +206,201 @@ fn settle(axes: &[Axis], start: Vector3<f64>) -> (Vector3<f64>, Vec<usize>) {
     }
     (direction, members)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Point3, Rotation3};
+    use open_structure::geometry::angle_between;
+    use proptest::prelude::*;
+
+    /// Lines around some directions: which direction, the error of theirs, midpoint, length.
+    type Made = Vec<(usize, [f64; 3], [f64; 3], f64)>;
+
+    fn made(directions: usize) -> impl Strategy<Value = Made> {
+        let three = |range: f64| prop::array::uniform3(-range..range);
+        prop::collection::vec((0..directions, three(0.015), three(5.0), 0.1..3.0), 2..40)
+    }
+
+    fn build(made: &Made, directions: &[Vector3<f64>]) -> Vec<Segment> {
+        let line = |(which, error, middle, length): &(usize, [f64; 3], [f64; 3], f64)| {
+            let half = (directions[*which] + Vector3::from(*error)).normalize() * (length / 2.0);
+            let middle = Point3::from(*middle);
+            Segment { start: middle - half, end: middle + half }
+        };
+        made.iter().map(line).collect()
+    }
+
+    fn turned(angles: [f64; 3]) -> Rotation3<f64> {
+        Rotation3::from_euler_angles(angles[0], angles[1], angles[2])
+    }
+
+    fn undirected(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
+        let angle = angle_between(a, b);
+        angle.min(std::f64::consts::PI - angle)
+    }
+
+    proptest! {
+        #[test]
+        fn order_and_ends_of_the_lines_do_not_matter(
+            made in made(5), angles in prop::array::uniform3(-3.0..3.0), keys in prop::collection::vec(any::<u32>(), 40),
+            flips in prop::collection::vec(any::<bool>(), 40),
+        ) {
+            let rotation = turned(angles);
+            let places = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.7, 0.7, 0.0], [0.05, 1.0, 0.0]];
+            let lines = build(&made, &places.map(|place| rotation * Vector3::from(place)));
+            let options = GroupOptions::default();
+            let mut first = lines.clone();
+            let groups = group_lines(&mut first, &options);
+            let mut order: Vec<usize> = (0..lines.len()).collect();
+            order.sort_by_key(|line| keys[*line]);
+            let flip = |line: usize| {
+                let Segment { start, end } = lines[line];
+                if flips[line] { Segment { start: end, end: start } } else { lines[line] }
+            };
+            let mut second: Vec<Segment> = order.iter().map(|line| flip(*line)).collect();
+            let mut again = group_lines(&mut second, &options);
+            for group in &mut again {
+                group.members = group.members.iter().map(|place| order[*place]).collect();
+                group.members.sort_unstable();
+            }
+            prop_assert_eq!(&groups, &again);
+            for group in &groups {
+                for (place, line) in order.iter().enumerate() {
+                    if group.members.contains(line) {
+                        prop_assert_eq!(first[*line], second[place]);
+                    }
+                }
+            }
+        }
+
+        #[test]
+        fn lines_of_a_group_are_parallel_and_were_hardly_moved(
+            made in made(5), angles in prop::array::uniform3(-3.0..3.0),
+        ) {
+            let rotation = turned(angles);
+            let places = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.7, 0.7, 0.0], [0.05, 1.0, 0.0]];
+            let lines = build(&made, &places.map(|place| rotation * Vector3::from(place)));
+            let options = GroupOptions::default();
+            let mut after = lines.clone();
+            let groups = group_lines(&mut after, &options);
+            let parallel: Vec<&Group> = groups.iter().filter(|group| group.kind == registry::PARALLEL).collect();
+            let mut times = vec![0; lines.len()];
+            for group in &parallel {
+                prop_assert!(group.members.len() >= 2 && group.members.is_sorted());
+                for member in &group.members {
+                    times[*member] += 1;
+                    let (old, new) = (&lines[*member], &after[*member]);
+                    // Radians: a rounding of coordinates of a few metres over at least 0.1 m.
+                    prop_assert!(angle_between(&new.direction().unwrap(), &group.direction) < 1e-13);
+                    prop_assert!((old.length() - new.length()).abs() < 1e-13);
+                    prop_assert!((old.midpoint() - new.midpoint()).norm() < 1e-13);
+                    // Making directions orthogonal turns them by less than the tolerance on top of what a group allows.
+                    let turn = options.angle_deg.min(2.0 * (options.shift_m / old.length()).asin().to_degrees());
+                    let limit = turn + options.orthogonal_deg;
+                    let angle = undirected(&old.direction().unwrap(), &group.direction).to_degrees();
+                    prop_assert!(angle <= limit + 1e-9, "{angle} {limit}");
+                }
+            }
+            for (line, times) in times.into_iter().enumerate() {
+                prop_assert!(times <= 1);
+                if times == 0 {
+                    prop_assert_eq!(lines[line], after[line]);
+                }
+            }
+        }
+
+        #[test]
+        fn a_manhattan_world_becomes_exact(made in made(3), angles in prop::array::uniform3(-3.0..3.0), off in prop::array::uniform3(-0.004..0.004)) {
+            let rotation = turned(angles);
+            let axes = [0, 1, 2].map(|axis| Vector3::ith_axis(axis).into_inner());
+            let bent = [0, 1, 2].map(|axis| rotation * (axes[axis] + axes[(axis + 1) % 3] * off[axis]));
+            // Two exact lines of each direction, so that each is a group.
+            let mut lines = build(&made, &bent);
+            for (place, direction) in bent.iter().enumerate().flat_map(|pair| [pair, pair]) {
+                let start = Point3::new(20.0, place as f64, 0.0);
+                lines.push(Segment { start, end: start + direction * 30.0 });
+            }
+            // Metres: room for lines of 30 m to be turned.
+            let options = GroupOptions { shift_m: 1.0, ..GroupOptions::default() };
+            let groups = group_lines(&mut lines, &options);
+            let manhattan: Vec<&Group> = groups.iter().filter(|group| group.kind == registry::MANHATTAN).collect();
+            prop_assert_eq!(manhattan.len(), 1);
+            let parts: Vec<&Group> = groups
+                .iter()
+                .filter(|group| group.kind == registry::PARALLEL && group.members.iter().any(|m| manhattan[0].members.contains(m)))
+                .collect();
+            prop_assert_eq!(parts.len(), 3);
+            prop_assert_eq!(parts.iter().map(|part| part.members.len()).sum::<usize>(), manhattan[0].members.len());
+            for (index, part) in parts.iter().enumerate() {
+                prop_assert!(part.members.iter().all(|member| manhattan[0].members.contains(member)));
+                for other in &parts[index + 1..] {
+                    // Rounding.
+                    prop_assert!(part.direction.dot(&other.direction).abs() < 1e-14);
+                }
+            }
+            prop_assert!(parts.iter().any(|part| part.direction == manhattan[0].direction));
+        }
+    }
+
+    /// Lines of given directions, two of each.
+    fn pairs(directions: &[[f64; 3]]) -> Vec<Segment> {
+        let pair = |(place, direction): (usize, &[f64; 3])| {
+            [0.0, 1.0].map(|side| {
+                let start = Point3::new(place as f64, side, 0.0);
+                Segment {
+                    start,
+                    end: start + Vector3::from(*direction).normalize() * (2.0 - 0.1 * place as f64),
+                }
+            })
+        };
+        directions.iter().enumerate().flat_map(pair).collect()
+    }
+
+    #[test]
+    fn an_upright_and_several_level_directions_are_an_atlanta() {
+        let kinds = |directions: &[[f64; 3]]| {
+            let groups = group_lines(&mut pairs(directions), &GroupOptions::default());
+            groups.into_iter().filter(|group| group.kind != registry::PARALLEL).collect::<Vec<_>>()
+        };
+        let upright = [0.001, 0.0, 1.0];
+        let both = kinds(&[upright, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.5, 0.005]]);
+        assert_eq!(
+            both.iter().map(|g| (g.kind, g.members.len())).collect::<Vec<_>>(),
+            [("manhattan", 6), ("atlanta", 8)]
+        );
+        assert_eq!(both[0].direction, both[1].direction);
+        assert!(undirected(&both[1].direction, &Vector3::z()) < 0.01);
+        let alone = kinds(&[upright, [1.0, 0.0, 0.0], [1.0, 0.5, 0.005]]);
+        assert_eq!(alone.iter().map(|g| (g.kind, g.members.len())).collect::<Vec<_>>(), [("atlanta", 6)]);
+        assert!(kinds(&[upright, [1.0, 0.0, 0.0]]).is_empty());
+        assert!(kinds(&[[1.0, 1.0, 1.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]).is_empty());
+    }
+
+    #[test]
+    fn a_long_line_that_would_move_far_stays_out_of_the_group() {
+        let options = GroupOptions::default();
+        let mut lines = pairs(&[[1.0, 0.0, 0.0]]);
+        // Two degrees off: 0.1 m moves by 1.7 mm, 10 m by 17 cm.
+        let beside = |length: f64, slope: f64| {
+            let start = Point3::new(0.0, 3.0, 0.0);
+            Segment { start, end: start + Vector3::new(1.0, slope, 0.0).normalize() * length }
+        };
+        lines.extend([beside(0.1, 0.0349), beside(10.0, -0.0349)]);
+        let groups = group_lines(&mut lines, &options);
+        assert_eq!(groups.len(), 1);
+        assert_eq!(groups[0].members, [0, 1, 2]);
+    }
+
+    #[test]
+    fn lines_without_a_direction_are_in_no_group() {
+        let here = Point3::new(1.0, 2.0, 3.0);
+        let nowhere = Point3::new(f64::NAN, 0.0, f64::INFINITY);
+        let mut lines = vec![Segment { start: here, end: here }; 2];
+        lines.extend([Segment { start: nowhere, end: here }; 2]);
+        lines.extend(pairs(&[[1.0, 0.0, 0.0]]));
+        let groups = group_lines(&mut lines, &GroupOptions::default());
+        assert_eq!(groups.iter().map(|group| group.members.clone()).collect::<Vec<_>>(), [[4, 5]]);
+        assert!(group_lines(&mut [], &GroupOptions::default()).is_empty());
+    }
+}

@@ -192,3 +192,145 @@ fn near(places: &[Place], through: Point3<f64>, direction: Vector3<f64>) -> Vec<
     let on_line = |place: &&Place| direction.cross(&(place.point - through)).norm() <= place.reach;
     places.iter().filter(on_line).copied().collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rgbd::BrownConrady;
+    use nalgebra::Vector2;
+    use open_structure::geometry::PinholeCamera;
+    use open_structure::structure::{Camera, CameraId, registry};
+    use proptest::prelude::*;
+
+    const NOISE: DepthNoise = DepthNoise { constant_m: 1e-3, linear: 0.0, quadratic_per_m: 0.0 };
+
+    fn raster(lens: bool) -> Raster {
+        let pinhole = PinholeCamera { fx: 130.0, fy: 135.0, cx: 80.0, cy: 60.0, width: 160, height: 120 };
+        let lens = lens.then(|| BrownConrady::new([0.2312, -0.7849, -0.0033, -0.0001, 0.9172]));
+        Raster::new(&Camera::pinhole(CameraId(0), &pinhole, registry::PIXEL_CORNER), lens)
+    }
+
+    /// The depth map of a function of raster positions.
+    fn map(depth: impl Fn(Point2<f64>) -> f64) -> DepthMap {
+        let cells = (0..160 * 120)
+            .map(|cell| depth(Point2::new(f64::from(cell % 160), f64::from(cell / 160))) as f32);
+        DepthMap::new(160, 120, cells.collect()).unwrap()
+    }
+
+    /// A plane whose normal, divided by its distance, is this: `n · p = 1`.
+    fn plane(raster: &Raster, normal: Vector3<f64>, at: Point2<f64>) -> f64 {
+        raster.back_project(at, 1.0).map_or(f64::NAN, |ray| 1.0 / normal.dot(&ray.coords))
+    }
+
+    fn pose() -> impl Strategy<Value = Pose> {
+        (prop::array::uniform3(-5.0..5.0), prop::array::uniform4(0.1..1.0))
+            .prop_map(|(t, q)| Pose::from_components(t, q).unwrap())
+    }
+
+    fn lifted(
+        raster: &Raster,
+        depth: &DepthMap,
+        segment: [Point2<f64>; 2],
+        options: &LineOptions,
+    ) -> Result<LiftedLine, Rejected> {
+        lift(raster, depth, &Pose::identity(), segment, &NOISE, options, &mut Random::new(1, "lines", 0))
+    }
+
+    fn between(from: [f64; 2], to: [f64; 2]) -> [Point2<f64>; 2] {
+        [Point2::from(from), Point2::from(to)]
+    }
+
+    proptest! {
+        #[test]
+        fn a_segment_on_a_plane_is_lifted_onto_it(
+            world_from_camera in pose(), lens in any::<bool>(), slope in prop::array::uniform2(-0.15..0.15),
+            from in (10.0..70.0, 10.0..110.0), to in (90.0..150.0, 10.0..110.0), hidden in 0.2..0.8_f64,
+        ) {
+            let raster = raster(lens);
+            let normal = Vector3::new(slope[0], slope[1], 0.4);
+            let (from, to) = (Point2::from(<[f64; 2]>::from(from)), Point2::from(<[f64; 2]>::from(to)));
+            // Something stands in front of a tenth of the segment, about a place.
+            let place: Point2<f64> = from + (to - from) * hidden;
+            let reach = 0.05 * (to - from).norm();
+            let depth = map(|at: Point2<f64>| if (at - place).norm() < reach { 0.9 } else { plane(&raster, normal, at) });
+            let random = || Random::new(4, "lines", 2);
+            let options = LineOptions::default();
+            // Through the lens, the image of a line is bent by up to a pixel or two.
+            let options = LineOptions { straight_px: if lens { 4.0 } else { 1.0 }, ..options };
+            let line = lift(&raster, &depth, &world_from_camera, [from, to], &NOISE, &options, &mut random()).unwrap();
+            let again = lift(&raster, &depth, &world_from_camera, [from, to], &NOISE, &options, &mut random()).unwrap();
+            prop_assert_eq!(&line, &again);
+            let ends = [from, to].map(|at| world_from_camera * raster.back_project(at, plane(&raster, normal, at)).unwrap());
+            // Metres: within the thresholds of the fit; without a lens nothing but the file's 24 digits and rims is left.
+            let limit = if lens { 0.08 } else { 0.02 };
+            prop_assert!((line.segment.start - ends[0]).norm() < limit, "{line:?} {ends:?}");
+            prop_assert!((line.segment.end - ends[1]).norm() < limit, "{line:?} {ends:?}");
+            prop_assert!(line.places >= FEWEST && line.rim_part <= 0.5);
+        }
+    }
+
+    #[test]
+    fn at_a_rim_the_nearer_surface_has_the_line() {
+        let raster = raster(false);
+        let depth = map(|at| if at.x < 79.5 { 1.0 } else { 3.0 });
+        // The middle of the edge, and half a pixel to either side.
+        for x in [79.1, 79.5, 79.9] {
+            let edge = between([x, 10.0], [x, 100.0]);
+            let line = lifted(&raster, &depth, edge, &LineOptions::default()).unwrap();
+            assert!((line.segment.start.z - 1.0).abs() < 1e-6 && (line.segment.end.z - 1.0).abs() < 1e-6);
+            assert!(line.rim_part > 0.99, "{line:?}");
+            let options = LineOptions { rims: Rims::Reject, ..LineOptions::default() };
+            assert_eq!(lifted(&raster, &depth, edge, &options), Err(Rejected::OnRim));
+            let inside = edge.map(|end| end - Vector2::new(5.0, 0.0));
+            assert!(lifted(&raster, &depth, inside, &options).unwrap().rim_part < 0.01);
+        }
+    }
+
+    #[test]
+    fn each_reason_to_reject_a_segment_is_told() {
+        let raster = raster(false);
+        let options = LineOptions::default();
+        let segment = between([20.0, 30.0], [120.0, 40.0]);
+        let rejected = |depth: &DepthMap| lifted(&raster, depth, segment, &options).unwrap_err();
+        assert_eq!(rejected(&map(|at| if at.x < 80.0 { f64::NAN } else { 2.0 })), Rejected::TooFewDepths);
+        assert_eq!(rejected(&map(|at| 2.0 + 0.3 * (at.x * 0.1).sin())), Rejected::NotStraight);
+        let near = map(|_| 2.0);
+        let options = LineOptions { length_m: 1.6, ..options };
+        assert_eq!(lifted(&raster, &near, segment, &options), Err(Rejected::TooShort));
+        assert!(lifted(&raster, &near, segment, &LineOptions::default()).is_ok());
+    }
+
+    #[test]
+    fn odd_segments_and_options_are_refused_without_harm() {
+        let raster = raster(false);
+        let depth = map(|_| 2.0);
+        let odd = [f64::NAN, f64::INFINITY, -1e300, -40.0, 1e9];
+        for x in odd {
+            for y in odd {
+                let segment = between([x, y], [50.0, 50.0]);
+                assert!(lifted(&raster, &depth, segment, &LineOptions::default()).is_err(), "{segment:?}");
+            }
+        }
+        let segment = between([20.0, 30.0], [120.0, 40.0]);
+        for number in odd {
+            let options = LineOptions {
+                step_px: number,
+                straight_sigmas: number,
+                most_places: 0,
+                ..LineOptions::default()
+            };
+            let _ = lifted(&raster, &depth, segment, &options);
+            let options = LineOptions {
+                depth_part: number,
+                straight_part: number,
+                length_m: number,
+                ..LineOptions::default()
+            };
+            let _ = lifted(&raster, &depth, segment, &options);
+        }
+        let point = between([20.0, 30.0], [20.0, 30.0]);
+        assert!(
+            lifted(&raster, &depth, point, &LineOptions { length_m: 0.0, ..LineOptions::default() }).is_err()
+        );
+    }
+}

@@ -19,6 +19,8 @@ pub enum Became {
     New(usize),
     /// Part of a landmark that was there.
     Part(usize),
+    /// Nothing: it has no length, or is not finite.
+    Nothing,
 }
 
 /// A line of the world and what it was made of.
@@ -81,11 +83,8 @@ impl LineMap {
     /// # Source
     /// Open-Structure (Li et al. 2024), section III-A: angles and distances of lines, positions updated incrementally.
     pub fn add(&mut self, frame: u32, lines: &[LiftedLine]) -> Vec<Became> {
-        lines
-            .iter()
-            .filter_map(|line| Landmark::new(frame, line))
-            .map(|landmark| self.take(landmark))
-            .collect()
+        let take = |line| Landmark::new(frame, line).map_or(Became::Nothing, |landmark| self.take(landmark));
+        lines.iter().map(take).collect()
     }
 
     fn take(&mut self, new: Landmark) -> Became {
@@ -196,7 +195,7 @@ impl Landmark {
 
     /// How far another may be that is the same, at least by its own tolerance, metres.
     fn reach(&self, options: &LineOptions) -> f64 {
-        options.fuse_gap_m + options.fuse_distance_m + 4.0 * self.tolerance_m
+        options.fuse_gap_m + options.fuse_distance_m + 4.0 * options.fuse_widths * self.tolerance_m
     }
 
     fn envelope(&self, room: f64) -> AABB<[f64; 3]> {
@@ -218,7 +217,8 @@ impl Landmark {
         if gap > options.fuse_gap_m {
             return None;
         }
-        let threshold = options.fuse_distance_m + self.tolerance_m + other.tolerance_m;
+        let threshold =
+            options.fuse_distance_m + options.fuse_widths * (self.tolerance_m + other.tolerance_m);
         let across = offsets.map(|offset| long.direction.cross(&offset).norm());
         let worst = across[0].max(across[1]);
         (worst <= threshold).then(|| worst / threshold + gap / options.fuse_gap_m.max(f64::MIN_POSITIVE))
@@ -278,5 +278,147 @@ impl Landmark {
             tolerance_m: self.tolerance_m,
             rim_part: self.rim_sum / f64::from(self.detections),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Unit, Vector2};
+    use proptest::prelude::*;
+
+    const TOLERANCE_M: f64 = 0.005;
+
+    /// A line as if lifted: places evenly between two points.
+    fn lifted(start: Point3<f64>, end: Point3<f64>) -> LiftedLine {
+        let places = (0..=20).map(|step| (start + (end - start) * (f64::from(step) / 20.0), 1.0));
+        LiftedLine {
+            segment: Segment { start, end },
+            scatter: Scatter::of(places).unwrap(),
+            tolerance_m: TOLERANCE_M,
+            rim_part: 0.0,
+            places: 21,
+        }
+    }
+
+    fn finished(views: &[LiftedLine]) -> Vec<LineCandidate> {
+        let mut map = LineMap::new(&LineOptions::default());
+        for (frame, view) in (0..).zip(views) {
+            map.add(frame, std::slice::from_ref(view));
+        }
+        map.finish()
+    }
+
+    /// A sighting: of which line, which part of it, how far either end is off, and whether it runs backwards.
+    type Sighting = (usize, f64, f64, [f64; 6], bool);
+
+    fn sightings() -> impl Strategy<Value = Vec<Sighting>> {
+        let error = prop::array::uniform6(-0.002..0.002);
+        prop::collection::vec((0..6_usize, 0.0..0.35, 0.65..1.0, error, any::<bool>()), 30..80)
+    }
+
+    /// Six lines of 2 m, at least 0.4 m apart or at an angle.
+    fn truth(which: usize) -> Segment {
+        let place = which as f64;
+        let start = Point3::new(0.4 * place, 30.0 + 0.3 * place, -20.0);
+        let direction =
+            Unit::new_normalize(Vector3::new(0.3, if which < 3 { 1.0 } else { -1.0 }, 0.2 * place));
+        Segment { start, end: start + direction.into_inner() * 2.0 }
+    }
+
+    fn view((which, from, to, error, backwards): &Sighting) -> LiftedLine {
+        let line = truth(*which);
+        let along = line.end - line.start;
+        let start = line.start + along * *from + Vector3::new(error[0], error[1], error[2]);
+        let end = line.start + along * *to + Vector3::new(error[3], error[4], error[5]);
+        if *backwards { lifted(end, start) } else { lifted(start, end) }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn sightings_of_some_lines_become_these_lines(sightings in sightings()) {
+            let views: Vec<_> = sightings.iter().map(view).collect();
+            let found = finished(&views);
+            let mut seen: Vec<usize> = sightings.iter().map(|sighting| sighting.0).collect();
+            seen.sort_unstable();
+            seen.dedup();
+            prop_assert_eq!(found.len(), seen.len());
+            prop_assert_eq!(found.iter().map(|line| line.detections as usize).sum::<usize>(), views.len());
+            for line in &found {
+                let near = |which: &usize| {
+                    let truth = truth(*which).plucker().unwrap();
+                    truth.distance_to_point(line.segment.start).max(truth.distance_to_point(line.segment.end))
+                };
+                let which = *seen.iter().min_by(|a, b| near(a).total_cmp(&near(b))).unwrap();
+                // Metres: errors of 2 mm along each axis at an end, at worst carried on over half the length again.
+                prop_assert!(near(&which) < 0.006, "{}", near(&which));
+                let own: Vec<&Sighting> = sightings.iter().filter(|sighting| sighting.0 == which).collect();
+                prop_assert_eq!(own.len(), line.detections as usize);
+                // The extent: the second of either side's ends, where there are three.
+                let mut starts: Vec<f64> = own.iter().map(|sighting| sighting.1 * 2.0).collect();
+                let mut ends: Vec<f64> = own.iter().map(|sighting| sighting.2 * 2.0).collect();
+                starts.sort_by(f64::total_cmp);
+                ends.sort_by(|a, b| b.total_cmp(a));
+                let rank = usize::from(own.len() >= 3);
+                let along = truth(which).direction().unwrap();
+                let places = [line.segment.start, line.segment.end].map(|end| along.dot(&(end - truth(which).start)));
+                prop_assert!((places[0].min(places[1]) - starts[rank]).abs() < 0.005);
+                prop_assert!((places[0].max(places[1]) - ends[rank]).abs() < 0.005);
+                prop_assert!(line.rms_m < 0.004 && line.frames.is_sorted());
+            }
+        }
+
+        #[test]
+        fn the_order_of_sightings_changes_no_landmark(sightings in sightings(), shift in any::<prop::sample::Index>()) {
+            let mut views: Vec<_> = sightings.iter().map(view).collect();
+            let first = finished(&views);
+            let turned = shift.index(views.len());
+            views.rotate_left(turned);
+            views.reverse();
+            let mut second = finished(&views);
+            for line in &first {
+                let apart = |other: &LineCandidate| {
+                    let (a, b) = (line.segment, other.segment);
+                    let same = (a.start - b.start).norm().max((a.end - b.end).norm());
+                    same.min((a.start - b.end).norm().max((a.end - b.start).norm()))
+                };
+                let best = (0..second.len()).min_by(|a, b| apart(&second[*a]).total_cmp(&apart(&second[*b]))).unwrap();
+                // Metres: rounding of sums about 40 m from the origin.
+                prop_assert!(apart(&second[best]) < 1e-9, "{}", apart(&second[best]));
+                prop_assert_eq!(second.remove(best).detections, line.detections);
+            }
+            prop_assert!(second.is_empty());
+        }
+    }
+
+    #[test]
+    fn neighbours_and_crossing_lines_stay_apart_and_a_bridge_joins() {
+        let line = |from: f64, to: f64, aside: Vector2<f64>| {
+            lifted(Point3::new(from, aside.x, aside.y), Point3::new(to, aside.x, aside.y))
+        };
+        let here = Vector2::zeros();
+        let beside = Vector2::new(0.1, 0.0);
+        assert_eq!(finished(&[line(0.0, 1.0, here), line(0.0, 1.0, beside)]).len(), 2);
+        let across = lifted(Point3::new(0.5, -0.5, 0.0), Point3::new(0.5, 0.5, 0.0));
+        assert_eq!(finished(&[line(0.0, 1.0, here), across]).len(), 2);
+        let parts = [line(0.0, 1.0, here), line(2.0, 3.0, here)];
+        assert_eq!(finished(&parts).len(), 2);
+        let bridged = finished(&[parts.as_slice(), &[line(0.9, 2.1, here)]].concat());
+        assert_eq!(bridged.len(), 1);
+        assert_eq!((bridged[0].detections, bridged[0].frames.clone()), (3, vec![0, 1, 2]));
+    }
+
+    #[test]
+    fn what_each_line_became_is_told() {
+        let line = |at: f64| lifted(Point3::new(at, 0.0, 0.0), Point3::new(at, 1.0, 0.0));
+        let mut map = LineMap::new(&LineOptions::default());
+        assert!(map.is_empty());
+        assert_eq!(map.add(0, &[line(0.0), line(1.0)]), [Became::New(0), Became::New(1)]);
+        assert_eq!(map.add(1, &[line(1.001), line(2.0)]), [Became::Part(1), Became::New(2)]);
+        let odd =
+            LiftedLine { segment: Segment { start: Point3::origin(), end: Point3::origin() }, ..line(3.0) };
+        assert_eq!(map.add(2, &[odd]), [Became::Nothing]);
+        assert_eq!(map.len(), 3);
     }
 }

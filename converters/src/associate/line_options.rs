@@ -33,9 +33,11 @@ pub struct LineOptions {
     pub length_m: f64,
     /// Lines at up to this angle may be one landmark, degrees.
     pub fuse_angle_deg: f64,
-    /// The ends of the shorter may be this far from the line of the longer, metres; a standard deviation of the depth and the
-    /// width of a pixel at either's depth come on top.
+    /// The ends of the shorter may be this far from the line of the longer, metres; `fuse_widths` comes on top.
     pub fuse_distance_m: f64,
+    /// What comes on top, for each of both: a standard deviation of the depth and the width of a pixel at its depth, this many
+    /// times.
+    pub fuse_widths: f64,
     /// Gap between two parts of one landmark along it, metres.
     pub fuse_gap_m: f64,
     /// Frames that have to detect a landmark.
@@ -68,9 +70,10 @@ impl Default for LineOptions {
             straight_part: 0.7,
             length_m: 0.05,
             fuse_angle_deg: 4.0,
-            fuse_distance_m: 0.015,
-            fuse_gap_m: 0.1,
-            min_detections: 2,
+            fuse_distance_m: 0.005,
+            fuse_widths: 1.0,
+            fuse_gap_m: 0.3,
+            min_detections: 3,
             min_observations: 5,
             nearest_m: 0.05,
             sight_step_px: 2.0,

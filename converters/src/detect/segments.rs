@@ -165,3 +165,126 @@ fn sorted(mut segments: Vec<[Point2<f64>; 2]>) -> Vec<[Point2<f64>; 2]> {
     });
     segments
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector2;
+    use opencv::core::{CV_8UC3, Scalar};
+    use proptest::prelude::*;
+
+    const WIDTH: usize = 240;
+    const HEIGHT: usize = 200;
+    const DETECTORS: [Detector; 2] = [Detector::Fld, Detector::Lsd];
+
+    /// An image of a function of raster positions, each pixel the mean of a square of `fine` × `fine` places.
+    fn image(fine: u32, grey: impl Fn(Point2<f64>) -> f64) -> Mat {
+        let mut pixels = Vec::with_capacity(WIDTH * HEIGHT);
+        for row in 0..HEIGHT {
+            for column in 0..WIDTH {
+                let mut sum = 0.0;
+                for place in 0..fine * fine {
+                    let within = |step: u32| (f64::from(step) + 0.5) / f64::from(fine) - 0.5;
+                    let offset = Vector2::new(within(place % fine), within(place / fine));
+                    sum += grey(Point2::new(column as f64, row as f64) + offset);
+                }
+                pixels.push((sum / f64::from(fine * fine)).round() as u8);
+            }
+        }
+        Mat::from_slice(&pixels).unwrap().reshape(1, HEIGHT as i32).unwrap().try_clone().unwrap()
+    }
+
+    fn found(image: &Mat, detector: Detector) -> Vec<[Point2<f64>; 2]> {
+        segments(image, &SegmentOptions { detector, ..SegmentOptions::default() }).unwrap()
+    }
+
+    #[test]
+    fn an_edge_between_two_columns_lies_between_them() {
+        for (dark, bright) in [(60.0, 190.0), (190.0, 60.0)] {
+            let upright = image(1, |p| if p.x < 99.5 { dark } else { bright });
+            let level = image(1, |p| if p.y < 99.5 { dark } else { bright });
+            for detector in DETECTORS {
+                let [across, along] = [&upright, &level].map(|image| found(image, detector));
+                assert_eq!((across.len(), along.len()), (1, 1), "{detector:?} {across:?} {along:?}");
+                for end in 0..2 {
+                    // The edge is as sharp as can be, and the grey between pixels linear: nothing is left but rounding.
+                    assert!((across[0][end].x - 99.5).abs() < 1e-6, "{detector:?} {across:?}");
+                    assert!((along[0][end].y - 99.5).abs() < 1e-6, "{detector:?} {along:?}");
+                }
+                assert!(
+                    (across[0][1] - across[0][0]).norm() > 0.9 * HEIGHT as f64,
+                    "{detector:?} {across:?}"
+                );
+            }
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+        #[test]
+        fn a_slanted_edge_is_found_where_it_is(
+            turn in 0.0..std::f64::consts::PI, shift in -20.0..20.0_f64, which in 0..2_usize,
+        ) {
+            let normal = Vector2::new(libm::cos(turn), libm::sin(turn));
+            let middle = Point2::new(119.5, 99.5);
+            let distance = |p: Point2<f64>| normal.dot(&(p - middle)) - shift;
+            let found = found(&image(6, |p| if distance(p) < 0.0 { 70.0 } else { 180.0 }), DETECTORS[which]);
+            prop_assert!(!found.is_empty());
+            let length: f64 = found.iter().map(|[a, b]| (b - a).norm()).sum();
+            prop_assert!(length > 80.0, "{length}");
+            for segment in found {
+                for end in segment {
+                    // Pixels: grey in steps of a 256th and a pixel's linear interpolation leave a tenth.
+                    prop_assert!(distance(end).abs() < 0.2, "{:?} {end} {}", DETECTORS[which], distance(end));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_broken_edge_is_one_segment_and_short_ones_are_left_out() {
+        let broken = |gap: f64| {
+            image(1, move |p| if p.x < 99.5 || (p.y - 100.0).abs() < gap / 2.0 { 60.0 } else { 190.0 })
+        };
+        let upright =
+            |found: Vec<[Point2<f64>; 2]>| found.into_iter().filter(|[a, b]| (a.x - b.x).abs() < 1.0).count();
+        assert_eq!(upright(found(&broken(4.0), Detector::Fld)), 1);
+        assert_eq!(upright(found(&broken(40.0), Detector::Fld)), 2);
+        let short =
+            image(1, |p| if (p.x - 99.5).abs() < 9.0 && (p.y - 80.0).abs() < 9.0 { 60.0 } else { 190.0 });
+        assert!(found(&short, Detector::Fld).is_empty());
+    }
+
+    #[test]
+    fn the_longest_are_kept_and_all_stand_in_order() {
+        let bars =
+            image(
+                1,
+                |p| if (p.x / 24.0).floor() % 2.0 > 0.0 && p.y > 190.0 - p.x / 2.0 { 60.0 } else { 190.0 },
+            );
+        let all = segments(&bars, &SegmentOptions::default()).unwrap();
+        assert!(all.len() > 6 && all.windows(2).all(|pair| key(&pair[0]) <= key(&pair[1])), "{all:?}");
+        let some = segments(&bars, &SegmentOptions { most: 4, ..SegmentOptions::default() }).unwrap();
+        let length = |segment: &[Point2<f64>; 2]| (segment[1] - segment[0]).norm();
+        let least = some.iter().map(length).fold(f64::INFINITY, f64::min);
+        assert_eq!(some.len(), 4);
+        assert!(all.iter().filter(|segment| length(segment) > least).count() < 4);
+        assert!(some.iter().all(|segment| all.contains(segment)));
+    }
+
+    #[test]
+    fn what_is_not_a_grey_image_is_refused_and_a_tiny_one_is_empty() {
+        let options = SegmentOptions::default();
+        let colour = Mat::new_rows_cols_with_default(50, 50, CV_8UC3, Scalar::all(0.0)).unwrap();
+        assert!(matches!(segments(&colour, &options), Err(Error::NotGrey { channels: 3, .. })));
+        let tiny = Mat::new_rows_cols_with_default(4, 50, CV_8U, Scalar::all(0.0)).unwrap();
+        for image in [tiny, Mat::default()] {
+            assert_eq!(segments(&image, &options).unwrap(), Vec::<[Point2<f64>; 2]>::new());
+        }
+        let noise = image(1, |p| (p.x * 7919.0 + p.y * 104_729.0).rem_euclid(256.0).floor());
+        let odd = SegmentOptions { piece_px: f64::NAN, merge_angle_deg: f64::NAN, ..options };
+        for detector in DETECTORS {
+            assert!(segments(&noise, &SegmentOptions { detector, ..odd.clone() }).is_ok());
+        }
+    }
+}

@@ -14,7 +14,7 @@ use super::describe::manifest;
 use super::first_pass::look;
 use super::second_pass::{Seen, SeenLine, find};
 use super::{Error, Ledger, Options, Progress};
-use crate::associate::{Group, LineCandidate, LineMap, PointCandidate, PointMap, group_lines};
+use crate::associate::{Group, LineCandidate, LineMap, LineOptions, PointCandidate, PointMap, group_lines};
 use crate::ordered::ordered;
 use crate::rgbd::{RawFrame, RawSequence};
 
@@ -64,7 +64,9 @@ pub fn generate(
     let mut ledger = Ledger::default();
     let mut excluded: Vec<Exclusion> = Vec::new();
     let mut points = PointMap::new(options.point_landmarks);
-    let mut lines = LineMap::new(&options.lines);
+    // Where true poses are off, so is one view of a line from another.
+    let fuse_distance_m = options.lines.fuse_distance_m + raw.pose_sigma_m;
+    let mut lines = LineMap::new(&LineOptions { fuse_distance_m, ..options.lines.clone() });
     let mut usable: Vec<&RawFrame> = Vec::with_capacity(raw.frames.len());
     ordered(
         raw.frames.len(),

@@ -123,6 +123,7 @@ impl Options {
             ("lines.length_m", lines.length_m, METRES),
             ("lines.fuse_angle_deg", lines.fuse_angle_deg, [0.0, 90.0]),
             ("lines.fuse_distance_m", lines.fuse_distance_m, METRES),
+            ("lines.fuse_widths", lines.fuse_widths, [0.0, 100.0]),
             ("lines.fuse_gap_m", lines.fuse_gap_m, METRES),
             ("lines.nearest_m", lines.nearest_m, [1e-3, 1e4]),
             ("lines.sight_step_px", lines.sight_step_px, [0.1, 100.0]),

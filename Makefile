@@ -39,7 +39,7 @@ lint:
 	@if command -v cargo-deny > /dev/null; then cargo deny check; else .ci/dependencies.py; fi
 
 bench:
-	cargo bench --locked
+	cargo bench --workspace --locked
 
 # cargo-fuzz asks for a nightly compiler's flags; the stable one takes them when told to. No sanitizer: our
 # code is safe throughout, so panics, hangs and memory are what there is to find.

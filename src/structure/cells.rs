@@ -73,10 +73,14 @@ impl ImageCells {
     /// Amanatides and Woo, *A fast voxel traversal algorithm for ray tracing*, 1987; at a corner of four cells we take
     /// those that own a point of the segment, where the paper leaves it open.
     pub fn cover_segment(&mut self, start: [f64; 2], end: [f64; 2]) {
+        let whole = [start, end];
         let Some([start, end]) = self.cut(start, end) else { return };
         let (mut column, mut row) = (index(start[0]), index(start[1]));
-        let across = Axis::new(start[0], end[0]);
-        let down = Axis::new(start[1], end[1]);
+        // Borders are met on the whole segment, whose numbers are exact, as long as their products are finite.
+        let [from, to] =
+            if whole.iter().flatten().all(|x| x.abs() < LARGE_PX) { whole } else { [start, end] };
+        let across = Axis::new(from[0], to[0]);
+        let down = Axis::new(from[1], to[1]);
         let (mut columns_left, mut rows_left) = (index(end[0]).abs_diff(column), index(end[1]).abs_diff(row));
         self.cover(column, row);
         while columns_left > 0 || rows_left > 0 {
@@ -152,7 +156,14 @@ impl ImageCells {
         let at = |(part, border): (f64, Option<(usize, f64)>)| {
             let mut pixel = [0.0; 2];
             for axis in 0..2 {
-                let between = start[axis] * (1.0 - part) + end[axis] * part;
+                let between = match border {
+                    // Rounded once, at the end: where the border is met at a corner of cells, that is found exactly.
+                    Some((other, border)) if start.iter().chain(&end).all(|x| x.abs() < LARGE_PX) => {
+                        let (along, by) = (border - start[other], end[other] - start[other]);
+                        start[axis] + (end[axis] - start[axis]) * along / by
+                    }
+                    _ => start[axis] * (1.0 - part) + end[axis] * part,
+                };
                 pixel[axis] = between.clamp(0.0, sizes[axis]);
             }
             if let Some((axis, border)) = border {
@@ -164,6 +175,9 @@ impl ImageCells {
         Some([start, if inside(&end) { end } else { at(leave) }])
     }
 }
+
+/// Numbers below this have finite products.
+const LARGE_PX: f64 = 1e100;
 
 /// One coordinate along a segment.
 struct Axis {
@@ -279,6 +293,12 @@ mod tests {
             let [a, b, c, d] = ends;
             prop_assert!(covered([a, b], [c, d]).len() <= 16);
         }
+    }
+
+    #[test]
+    fn a_segment_that_leaves_the_image_meets_corners_all_the_same() {
+        let [a, b, c, d] = [6, 14, 318, 262].map(|end| f64::from(end) * 0.25);
+        assert_eq!(covered([a, b], [c, d]), covered([c, d], [a, b]));
     }
 
     #[test]

@@ -99,8 +99,7 @@ mod tests {
     fn what_is_printed_is_read_and_changes_nothing() {
         let text = documented(&Options::default());
         assert_eq!(Options::from_toml(&text).unwrap(), Options::default(), "{text}");
-        let mut options = Options::default();
-        options.seed = 7;
+        let mut options = Options { seed: 7, ..Options::default() };
         options.points.max_features = 50;
         options.depth.farthest_m = Some(3.5);
         assert_eq!(Options::from_toml(&documented(&options)).unwrap(), options);

@@ -616,7 +616,8 @@ fn the_command_ends_with_the_next_one() {
         "{stdout}"
     );
     assert!(stdout.contains("CC0-1.0") && stdout.contains("Please cite: Nobody"), "{stdout}");
-    assert_eq!(stdout.lines().last(), Some("next: os-convert tum 'my images/images' -o small.mcap"));
+    let next = "next: os-convert tum 'my images/images' -o small.mcap --recipe my.toml";
+    assert_eq!(stdout.lines().last(), Some(next));
 
     let (stdout, _) = said(&os(&["fetch", "my.toml", "--json"], folder), 0);
     let json: serde_json::Value = serde_json::from_str(&stdout).unwrap();

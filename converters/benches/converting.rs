@@ -81,7 +81,7 @@ fn time(folder: &Path, scratch: &Path, figures: &mut Figures) -> Result<()> {
 /// What any front-end does with a frame: both images decoded, points with descriptors, segments.
 fn detectors(folder: &Path, index: usize) -> Result<usize> {
     let image = folder.join(format!("image_left/{index:06}_left.png"));
-    let grey = imread(&image.to_string_lossy(), IMREAD_GRAYSCALE)?;
+    let grey = imread(&image, IMREAD_GRAYSCALE)?;
     let bytes = fs::read(folder.join(format!("depth_left/{index:06}_left_depth.npy")))?;
     let depth: Vec<f32> = npyz::NpyFile::new(&bytes[..])?.into_vec()?;
     let mut orb = ORB::create(1000, 1.2, 8, 31, 0, 2, ORB_ScoreType::HARRIS_SCORE, 31, 20)?;

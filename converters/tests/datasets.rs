@@ -38,5 +38,5 @@ fn the_recipe_of_the_readme_is_good() {
     let family = FAMILIES.iter().find(|family| family.name == recipe.camera.family).unwrap();
     let camera = &recipe.camera;
     assert_eq!([camera.fx, camera.fy, camera.cx, camera.cy], family.intrinsics);
-    assert_eq!(recipe.arguments("in", "out").join(" "), "tum in -o out --stride 2");
+    assert_eq!(recipe.arguments("in", "out", "x").join(" "), "tum in -o out --recipe x --stride 2");
 }

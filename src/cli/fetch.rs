@@ -99,7 +99,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     let fetched = fetch::fetch(&recipe, &into, &options, &|event| progress.show(&event))?;
     drop(progress);
 
-    let next = next_command(&recipe, what, &fetched);
+    let next = next_command(name, &recipe, what, &fetched);
     let note = part.and_then(|part| part.note.as_deref());
     if args.json {
         let result = json!({
@@ -146,10 +146,10 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
 }
 
 /// The command that makes a sequence of what was fetched, ready for a shell.
-fn next_command(recipe: &Recipe, what: What, fetched: &Fetched) -> Vec<String> {
+fn next_command(name: &str, recipe: &Recipe, what: What, fetched: &Fetched) -> Vec<String> {
     let folder = fetched.folder.to_string_lossy();
     let arguments = match what {
-        What::Raw => recipe.arguments(&folder, &format!("{}.mcap", recipe.name)),
+        What::Raw => recipe.arguments(&folder, &format!("{}.mcap", recipe.name), name),
         What::TextRelease => {
             // The release has some sequences twice; then this is a folder of both.
             let output = format!("{}-release", recipe.name);

@@ -106,9 +106,12 @@ impl Recipe {
     }
 
     /// Arguments of `os-convert` that make the sequence of a folder with its images.
+    ///
+    /// * `recipe` — what this recipe is known by to `os-convert`: its name, or its file.
     #[must_use]
-    pub fn arguments(&self, folder: &str, output: &str) -> Vec<String> {
-        let mut arguments = [self.dataset.command(), folder, "-o", output].map(str::to_owned).to_vec();
+    pub fn arguments(&self, folder: &str, output: &str, recipe: &str) -> Vec<String> {
+        let words = [self.dataset.command(), folder, "-o", output, "--recipe", recipe];
+        let mut arguments = words.map(str::to_owned).to_vec();
         arguments.extend(convert_options::arguments(&self.convert));
         arguments
     }

@@ -79,8 +79,8 @@ fn a_recipe_is_the_same_after_json() {
 #[test]
 fn options_become_arguments_of_the_converter() {
     let recipe = Recipe::from_toml(SMALL).unwrap();
-    let arguments = recipe.arguments("in", "out.mcap").join(" ");
-    let expected = "tum in -o out.mcap --frames 0..60 --keep-going --max-features 500 --min-length-px 12.5";
+    let arguments = recipe.arguments("in", "out.mcap", "small.toml").join(" ");
+    let expected = "tum in -o out.mcap --recipe small.toml --frames 0..60 --keep-going --max-features 500 --min-length-px 12.5";
     assert_eq!(arguments, expected);
     assert_eq!(recipe.raw.files[0].file_name(), "a.tgz");
     assert_eq!(recipe.raw.files[1].file_name(), "poses.txt");

@@ -9,6 +9,7 @@ use crate::generate::{self, Generated, Options};
 use crate::rgbd::{self, GivenCamera, Kinect, OpenOptions, RawSequence};
 use anyhow::Context as _;
 use clap::builder::PossibleValuesParser;
+use open_structure::datasets::{self, Recipe};
 use open_structure::format::{self, Encoding, WriteOptions};
 use open_structure::simulate::noise::{NoiseModel, NoiseRecipe};
 use serde::Serialize;
@@ -31,6 +32,17 @@ pub enum Dataset {
     TartanAir,
 }
 
+impl Dataset {
+    /// The command of the dataset.
+    const fn command(self) -> &'static str {
+        match self {
+            Self::Tum => "tum",
+            Self::Icl => "icl",
+            Self::TartanAir => "tartanair",
+        }
+    }
+}
+
 /// What the three commands share.
 #[derive(Debug, clap::Args)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a flag of the command line")]
@@ -45,6 +57,9 @@ pub struct Args {
     /// Name of the sequence; by default that of the dataset's
     #[arg(long)]
     name: Option<String>,
+    /// Recipe of the sequence, by name or file (see `os fetch`): its name, origin, licence and camera
+    #[arg(long, value_name = "NAME|FILE")]
+    recipe: Option<String>,
     /// Frames by their place in the dataset, B not included; either may be left out
     #[arg(long, value_name = "A..B", value_parser = frame_range)]
     frames: Option<Range<u64>>,
@@ -146,11 +161,23 @@ impl Args {
         Ok(options)
     }
 
-    fn open_options(&self) -> OpenOptions {
-        let kinect = self.kinect.as_deref().map(|name| match name {
-            "fr1" => Kinect::Fr1,
-            "fr2" => Kinect::Fr2,
-            _ => Kinect::Fr3,
+    fn recipe(&self) -> anyhow::Result<Option<Recipe>> {
+        let Some(name) = &self.recipe else { return Ok(None) };
+        let path = Path::new(name);
+        // A name of ours goes before a folder of that name, such as one that was fetched.
+        if path.extension().is_none() && !path.is_file() {
+            return Ok(Some(datasets::named(name)?));
+        }
+        Ok(Some(Recipe::from_toml(&text_of(path)?).with_context(|| name.clone())?))
+    }
+
+    fn open_options(&self, recipe: Option<&Recipe>) -> OpenOptions {
+        let family = recipe.and_then(|recipe| recipe.camera.family.strip_prefix("tum-"));
+        let kinect = self.kinect.as_deref().or(family).and_then(|name| match name {
+            "fr1" => Some(Kinect::Fr1),
+            "fr2" => Some(Kinect::Fr2),
+            "fr3" => Some(Kinect::Fr3),
+            _ => None,
         });
         #[expect(clippy::cast_possible_truncation, reason = "at most ten seconds")]
         let nanos = (self.max_difference * 1e9).round() as i64;
@@ -192,6 +219,7 @@ pub fn run(
     stderr: &mut dyn Write,
 ) -> anyhow::Result<Outcome> {
     let options = args.options()?;
+    let recipe = args.recipe()?;
     if args.print_config {
         write!(stdout, "{}", generate::documented(&options))?;
         return Ok(Outcome::Done);
@@ -201,6 +229,15 @@ pub fn run(
     };
     if args.kinect.is_some() && dataset != Dataset::Tum {
         writeln!(stderr, "error: --kinect is for TUM RGB-D")?;
+        return Ok(Outcome::Misused);
+    }
+    if let Some(recipe) = recipe.as_ref().filter(|recipe| recipe.dataset.command() != dataset.command()) {
+        writeln!(
+            stderr,
+            "error: {} is of another dataset: os-convert {}",
+            recipe.name,
+            recipe.dataset.command()
+        )?;
         return Ok(Outcome::Misused);
     }
     let encoding = Encoding::of_output(output);
@@ -219,12 +256,24 @@ pub fn run(
     let stages = Stages::default();
     let update = |stage: &'static str, done: u64, total: u64| stages.update(stage, done, total);
     let unpacked = Input::of(input, output, &update)?;
-    let open_options = args.open_options();
-    let raw = match dataset {
+    let open_options = args.open_options(recipe.as_ref());
+    let mut raw = match dataset {
         Dataset::Tum => rgbd::tum::open(unpacked.folder(), &open_options),
         Dataset::Icl => rgbd::icl::open(unpacked.folder(), &open_options),
         Dataset::TartanAir => rgbd::tartanair::open(unpacked.folder(), &open_options),
     }?;
+    if let Some(recipe) = recipe {
+        raw.name = recipe.name;
+        raw.description = recipe.description;
+        raw.source.sequence = Some(recipe.sequence);
+        raw.source.url = Some(recipe.url);
+        raw.source.licence = Some(recipe.licence);
+        raw.source.citation = Some(recipe.citation);
+    } else if matches!(unpacked, Input::Archive(_)) && raw.name.ends_with(".partial") {
+        // The archive has no folder: its own name has to do.
+        let stem = input.file_name().unwrap_or_default().to_string_lossy();
+        stem.split('.').next().unwrap_or_default().clone_into(&mut raw.name);
+    }
     let name = args.name.clone().unwrap_or_else(|| raw.name.clone());
     // Threads are ours: those of OpenCV would come on top of them.
     opencv::core::set_num_threads(1)?;

@@ -24,6 +24,7 @@ pub(super) fn manifest(
     ];
     Manifest {
         name: name.to_owned(),
+        description: raw.description.clone(),
         source: raw.source.clone(),
         generator: Generator {
             tool: TOOL.to_owned(),

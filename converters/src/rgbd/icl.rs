@@ -79,6 +79,7 @@ pub fn open(folder: &Path, options: &OpenOptions) -> Result<RawSequence, Error> 
     source.files = opened.files.into_iter().chain(calibration).collect();
     Ok(RawSequence {
         name,
+        description: None,
         source,
         clock: Clock { kind: registry::SYNTHETIC.to_owned(), rate_hz: Some(RATE_HZ as f64) },
         camera,

@@ -48,6 +48,8 @@ pub enum DepthFormat {
 pub struct RawSequence {
     /// Name of the sequence within the dataset.
     pub name: String,
+    /// What it shows, for people.
+    pub description: Option<String>,
     /// Dataset, licence, citation, and the lists that were read, with digests.
     pub source: Source,
     /// Where stamps come from.

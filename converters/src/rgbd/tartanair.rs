@@ -130,6 +130,7 @@ pub fn open(folder: &Path, options: &OpenOptions) -> Result<RawSequence, Error> 
     source.files = std::iter::once(truth.source).chain(calibration).collect();
     Ok(RawSequence {
         name,
+        description: None,
         source,
         clock: Clock { kind: registry::SYNTHETIC.to_owned(), rate_hz: Some(RATE_HZ as f64) },
         camera,

@@ -122,6 +122,7 @@ pub fn open(folder: &Path, options: &OpenOptions) -> Result<RawSequence, Error> 
     source.files = [colours.source, depths.source, truth.source].into_iter().chain(calibration).collect();
     Ok(RawSequence {
         name,
+        description: None,
         source,
         clock: Clock { kind: registry::RECORDED.to_owned(), rate_hz: None },
         camera,

@@ -6,6 +6,7 @@
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a program that prints a table")]
 
 #[path = "../../benches/figures/figure.rs"]
+#[expect(dead_code, reason = "bounds that other figures have")]
 mod figure;
 
 use std::fs;

@@ -7,8 +7,10 @@
 use nalgebra::{Point3, Vector3};
 use open_structure::format::{self, WriteOptions};
 use open_structure::geometry::Segment;
-use open_structure::structure::{FrameId, LineId, Sequence, registry};
+use open_structure::structure::{FrameId, LineId, PointId, Sequence, registry};
 use open_structure::validate;
+use open_structure_converters::associate::Rims;
+use open_structure_converters::detect::Detector;
 use open_structure_converters::generate::{Generated, Options, generate};
 use open_structure_converters::release;
 use open_structure_converters::rgbd::{self, OpenOptions, RawSequence};
@@ -59,69 +61,69 @@ fn one_line(one: &Segment, other: &Segment) -> bool {
     a.dot(&b).abs() >= cosine && aside <= 0.03 && s.max(t) >= 0.0 && s.min(t) <= other.length()
 }
 
+/// Points and lines that are published as seen in the frames that are here.
+fn published(release: PathBuf) -> (Vec<Point3<f64>>, Vec<Segment>) {
+    let limits = Limits::default();
+    let text = read(&discover(&[release], &limits).unwrap().sequences[0], &limits).unwrap();
+    let published = release::convert(&text, &release::Options::default()).unwrap().sequence;
+    let here = |frame: FrameId| frame.0 < FRAMES;
+    let rows = published.point_observations.iter().filter(|row| here(row.frame_id));
+    let points: BTreeSet<PointId> = rows.map(|row| row.point_id).collect();
+    let rows = published.line_observations.iter().filter(|row| here(row.frame_id));
+    let lines: BTreeSet<LineId> = rows.map(|row| row.line_id).collect();
+    let points = published.point_landmarks.iter().filter(|row| points.contains(&row.point_id));
+    let lines = published.line_landmarks.iter().filter(|row| lines.contains(&row.line_id));
+    (points.map(|row| row.position()).collect(), lines.map(|row| row.segment()).collect())
+}
+
 #[test]
 fn hospital_has_the_landmarks_that_were_published_for_it() {
     let folders = data("rgbd/tartanair_hospital_60").zip(data("open-structure/hospital"));
     let Some((frames, release)) = folders else { return };
     let raw = rgbd::tartanair::open(&frames, &OpenOptions::default()).unwrap();
-    let ours = written(&made(&raw));
-    assert_eq!(ours.frames.len(), 60);
+    let (points, lines) = published(release);
+    assert_eq!((points.len(), lines.len()), (62, 39));
+    // Least shares of published points and lines that are found, and of ours that are published: somewhat under what was found
+    // when this was written, 84, 92, 13 and 38 %. The release has few points and left most short lines away, so the other way
+    // round little can be known. Segments on rims are lines of the release's, too: without them fewer are found.
+    for (detector, rims, floors) in [
+        (Detector::Fld, Rims::Nearer, [0.78, 0.85, 0.10, 0.30]),
+        (Detector::Lsd, Rims::Nearer, [0.78, 0.80, 0.10, 0.25]),
+        (Detector::Fld, Rims::Reject, [0.78, 0.75, 0.10, 0.30]),
+    ] {
+        let mut options = Options::default();
+        options.segments.detector = detector;
+        options.lines.rims = rims;
+        let ours = written(&generate(&raw, "real", &options, 2, false, &|_, _, _| ()).unwrap());
+        let our_points: Vec<Point3<f64>> = ours.point_landmarks.iter().map(|row| row.position()).collect();
+        let our_lines: Vec<Segment> = ours.line_landmarks.iter().map(|row| row.segment()).collect();
+        let close = |a: &Point3<f64>, b: &Point3<f64>| (a - b).norm() <= 0.02;
+        let shares = [
+            share(&points, &our_points, close),
+            share(&lines, &our_lines, one_line),
+            share(&our_points, &points, close),
+            share(&our_lines, &lines, one_line),
+        ];
+        let [points_found, lines_found, points_known, lines_known] = shares.map(|share| 100.0 * share);
+        println!(
+            "hospital, frames 0..59, {detector:?}, rims {rims:?}: of {} published points {points_found:.1} % have one of our {} within 2 cm, {points_known:.1} % of ours one of them",
+            points.len(),
+            our_points.len(),
+        );
+        println!(
+            "    of {} published lines {lines_found:.1} % have one of our {} within 1 degree and 3 cm, {lines_known:.1} % of ours one of them",
+            lines.len(),
+            our_lines.len(),
+        );
+        assert!(shares.iter().zip(floors).all(|(share, floor)| *share >= floor), "{shares:?} {floors:?}");
 
-    let limits = Limits::default();
-    let text = read(&discover(&[release], &limits).unwrap().sequences[0], &limits).unwrap();
-    let published = release::convert(&text, &release::Options::default()).unwrap().sequence;
-    let here = |frame: FrameId| frame.0 < FRAMES;
-    let seen: BTreeSet<_> = published
-        .point_observations
-        .iter()
-        .filter(|row| here(row.frame_id))
-        .map(|row| row.point_id)
-        .collect();
-    let points: Vec<Point3<f64>> = published
-        .point_landmarks
-        .iter()
-        .filter(|row| seen.contains(&row.point_id))
-        .map(|row| row.position())
-        .collect();
-    let seen: BTreeSet<LineId> =
-        published.line_observations.iter().filter(|row| here(row.frame_id)).map(|row| row.line_id).collect();
-    let segments = |sequence: &Sequence, of: &dyn Fn(LineId) -> bool| -> Vec<Segment> {
-        sequence.line_landmarks.iter().filter(|row| of(row.line_id)).map(|row| row.segment()).collect()
-    };
-    let lines = segments(&published, &|line| seen.contains(&line));
-    let our_points: Vec<Point3<f64>> = ours.point_landmarks.iter().map(|row| row.position()).collect();
-    let our_lines = segments(&ours, &|_| true);
-    assert!(points.len() > 50 && lines.len() > 30, "{} {}", points.len(), lines.len());
-
-    let close = |a: &Point3<f64>, b: &Point3<f64>| (a - b).norm() <= 0.02;
-    let points_found = share(&points, &our_points, close);
-    let points_known = share(&our_points, &points, close);
-    let lines_found = share(&lines, &our_lines, one_line);
-    let lines_known = share(&our_lines, &lines, one_line);
-    println!(
-        "hospital, frames 0..59: {} published points, {:.1} % have one of our {} within 2 cm, {:.1} % the other way round",
-        points.len(),
-        100.0 * points_found,
-        our_points.len(),
-        100.0 * points_known
-    );
-    println!(
-        "hospital, frames 0..59: {} published lines, {:.1} % have one of our {} within 1 degree and 3 cm, {:.1} % the other way round",
-        lines.len(),
-        100.0 * lines_found,
-        our_lines.len(),
-        100.0 * lines_known
-    );
-    // Floors somewhat under what was found when this was written: 84, 13, 92 and 38 %. The release thinned its points out and
-    // left most short lines away, so the other way round little can be known.
-    assert!(points_found >= 0.78, "{points_found}");
-    assert!(points_known >= 0.10, "{points_known}");
-    assert!(lines_found >= 0.85, "{lines_found}");
-    assert!(lines_known >= 0.30, "{lines_known}");
-
-    // A building: three directions at right angles.
-    let manhattan = ours.structural_groups.iter().filter(|group| group.kind == registry::MANHATTAN).count();
-    assert_eq!(manhattan, 1);
+        // A building: most lines along three directions at right angles, which are the axes of the rendered world.
+        let manhattan =
+            ours.structural_groups.iter().find(|group| group.kind == registry::MANHATTAN).unwrap();
+        assert!(manhattan.line_ids.len() * 10 >= our_lines.len() * 7, "{}", manhattan.line_ids.len());
+        assert!(manhattan.direction().unwrap().amax() > 0.9999);
+        assert_eq!(ours.frames.len(), 60);
+    }
 }
 
 #[test]

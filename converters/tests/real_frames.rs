@@ -89,6 +89,7 @@ fn hospital_has_the_landmarks_that_were_published_for_it() {
     for (detector, rims, floors) in [
         (Detector::Fld, Rims::Nearer, [0.78, 0.85, 0.10, 0.30]),
         (Detector::Lsd, Rims::Nearer, [0.78, 0.80, 0.10, 0.25]),
+        (Detector::Ed, Rims::Nearer, [0.78, 0.75, 0.10, 0.25]),
         (Detector::Fld, Rims::Reject, [0.78, 0.75, 0.10, 0.30]),
     ] {
         let mut options = Options::default();

@@ -70,7 +70,7 @@ pub struct Args {
     #[arg(long, value_name = "N")]
     max_features: Option<u32>,
     /// Detector of line segments
-    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(["fld", "lsd"]))]
+    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(["fld", "lsd", "ed"]))]
     segments: Option<String>,
     /// Thresholds, as --print-config shows them
     #[arg(long, value_name = "FILE")]
@@ -147,6 +147,7 @@ impl Args {
         options.points.max_features = self.max_features.unwrap_or(options.points.max_features);
         match self.segments.as_deref() {
             Some("lsd") => options.segments.detector = Detector::Lsd,
+            Some("ed") => options.segments.detector = Detector::Ed,
             Some(_) => options.segments.detector = Detector::Fld,
             None => (),
         }

@@ -3,7 +3,9 @@
 use nalgebra::Point2;
 use opencv::core::{CV_8U, Mat, MatTraitConst as _, MatTraitConstManual as _, Vec4f, Vector, no_array};
 use opencv::imgproc::{LSD_REFINE_STD, LineSegmentDetectorTrait as _, create_line_segment_detector};
-use opencv::ximgproc::{FastLineDetectorTrait as _, create_fast_line_detector};
+use opencv::ximgproc::{
+    EdgeDrawingTrait as _, FastLineDetectorTrait as _, create_edge_drawing, create_fast_line_detector,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -24,13 +26,16 @@ pub enum Detector {
     Fld,
     /// Line segment detector (von Gioi et al. 2012): regions of one gradient direction.
     Lsd,
+    /// Edge drawing (Akinlar and Topal 2011, 2020): chains of edge pixels drawn from anchor to anchor, cut into straight pieces
+    /// that are not there by chance.
+    Ed,
 }
 
 /// Which edges of an image count as segments.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SegmentOptions {
-    /// The detector: `fld` or `lsd`.
+    /// The detector: `fld`, `lsd` or `ed`.
     pub detector: Detector,
     /// Shortest piece that the detector reports, before pieces are merged, pixels.
     pub piece_px: f64,
@@ -139,6 +144,11 @@ fn detect(grey: &Mat, options: &SegmentOptions) -> Result<Vec<[Point2<f64>; 2]>,
                 create_line_segment_detector(LSD_REFINE_STD, 0.8, 0.6, 2.0, 22.5, 0.0, 0.7, 1024)?;
             detector.detect(grey, &mut lines, &mut no_array(), &mut no_array(), &mut no_array())?;
         }
+        Detector::Ed => {
+            let mut detector = create_edge_drawing()?;
+            detector.detect_edges(grey)?;
+            detector.detect_lines(&mut lines)?;
+        }
     }
     let finite = |piece: &[Point2<f64>; 2]| piece.iter().all(|end| end.x.is_finite() && end.y.is_finite());
     Ok(lines
@@ -175,7 +185,7 @@ mod tests {
 
     const WIDTH: usize = 240;
     const HEIGHT: usize = 200;
-    const DETECTORS: [Detector; 2] = [Detector::Fld, Detector::Lsd];
+    const DETECTORS: [Detector; 3] = [Detector::Fld, Detector::Lsd, Detector::Ed];
 
     /// An image of a function of raster positions, each pixel the mean of a square of `fine` × `fine` places.
     fn image(fine: u32, grey: impl Fn(Point2<f64>) -> f64) -> Mat {

@@ -18,8 +18,10 @@ const NEAR: f64 = 1.0;
 pub struct DepthMap {
     width: usize,
     height: usize,
-    /// Row by row; NaN where there is none.
+    /// Row by row, as the file has them; those outside `range_m` are none.
     depth_m: Vec<f32>,
+    /// Depths that count, all of them finite and positive.
+    range_m: [f32; 2],
 }
 
 /// What a depth map says about a place.
@@ -51,17 +53,12 @@ impl DepthMap {
     ///
     /// `None` where the numbers do not fill the image.
     #[must_use]
-    pub fn new(width: u32, height: u32, mut depth_m: Vec<f32>) -> Option<Self> {
+    pub fn new(width: u32, height: u32, depth_m: Vec<f32>) -> Option<Self> {
         let (width, height) = (width as usize, height as usize);
         if width == 0 || height == 0 || width.checked_mul(height)? != depth_m.len() {
             return None;
         }
-        for depth in &mut depth_m {
-            if !(*depth > 0.0 && depth.is_finite()) {
-                *depth = f32::NAN;
-            }
-        }
-        Some(Self { width, height, depth_m })
+        Some(Self { width, height, depth_m, range_m: [f32::from_bits(1), f32::MAX] })
     }
 
     /// Columns and rows.
@@ -76,22 +73,31 @@ impl DepthMap {
         let column = usize::try_from(column).ok().filter(|column| *column < self.width)?;
         let row = usize::try_from(row).ok().filter(|row| *row < self.height)?;
         let depth = self.depth_m[row * self.width + column];
-        (!depth.is_nan()).then(|| f64::from(depth))
+        self.counts(depth).then(|| f64::from(depth))
     }
 
     /// Takes away depths outside a range, metres.
     pub fn limit(&mut self, nearest_m: f64, farthest_m: f64) {
-        for depth in &mut self.depth_m {
-            if !(nearest_m..=farthest_m).contains(&f64::from(*depth)) {
-                *depth = f32::NAN;
-            }
-        }
+        let [least, most] = &mut self.range_m;
+        // The nearest numbers of 32 bits within the range.
+        #[expect(clippy::cast_possible_truncation, reason = "rounded, and looked at")]
+        let (low, high) = (nearest_m as f32, farthest_m as f32);
+        let low = if f64::from(low) < nearest_m { low.next_up() } else { low };
+        let high = if f64::from(high) > farthest_m { high.next_down() } else { high };
+        *least = least.max(low);
+        *most = most.min(high);
+    }
+
+    /// Whether a number of the file is a depth.
+    fn counts(&self, depth_m: f32) -> bool {
+        let [least, most] = self.range_m;
+        (least..=most).contains(&depth_m)
     }
 
     /// Part of the pixels that have a depth.
     #[must_use]
     pub fn coverage(&self) -> f64 {
-        self.depth_m.iter().filter(|depth| !depth.is_nan()).count() as f64 / self.depth_m.len() as f64
+        self.depth_m.iter().filter(|depth| self.counts(**depth)).count() as f64 / self.depth_m.len() as f64
     }
 
     /// The nearest surface at a place between pixels.
@@ -291,6 +297,20 @@ mod tests {
             assert_eq!(map.sight(raster, 2.0, FOCAL_PX, &EXACT, 2), Sight::Unknown);
         }
         assert!((map.coverage() - (1.0 - 9.0 / 400.0)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_range_includes_its_ends_and_is_only_narrowed() {
+        let depths = [0.1, 0.1_f32.next_down(), 50.0, 50.0_f32.next_up(), 1.0];
+        let mut map = DepthMap::new(5, 1, depths.to_vec()).unwrap();
+        let there = |map: &DepthMap| [0, 1, 2, 3, 4].map(|column| map.at(column, 0).is_some());
+        assert_eq!(there(&map), [true; 5]);
+        map.limit(f64::from(0.1_f32), 50.0);
+        assert_eq!(there(&map), [true, false, true, false, true]);
+        map.limit(0.0, f64::INFINITY);
+        assert_eq!(there(&map), [true, false, true, false, true]);
+        map.limit(2.0, 1.0);
+        assert_eq!(there(&map), [false; 5]);
     }
 
     #[test]

@@ -27,7 +27,12 @@ impl Surfaces {
     }
 
     /// Depth of the surface that a camera shows at an image position, metres.
-    pub(crate) fn depth(&self, camera: &PinholeCamera, scene_from_camera: &Pose, pixel: Point2<f64>) -> Option<f64> {
+    pub(crate) fn depth(
+        &self,
+        camera: &PinholeCamera,
+        scene_from_camera: &Pose,
+        pixel: Point2<f64>,
+    ) -> Option<f64> {
         let direction = scene_from_camera.transform_vector(&camera.back_project(pixel, 1.0).coords);
         let eye = Point3::from(scene_from_camera.translation());
         self.occluders.first_hit(&eye, &direction, 1e3).map(|hit| hit.along)

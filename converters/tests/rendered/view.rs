@@ -8,6 +8,9 @@ use open_structure_converters::generate::Generated;
 use super::furnished::Room;
 use super::truth::{Surfaces, nearest_on_segment};
 
+/// Rays to either side between a place and the end of the slack: so many that depths of a steep surface are not missed.
+const FINE: i32 = 6;
+
 /// A frame with its camera.
 pub(crate) struct View {
     /// The camera that took the images.
@@ -69,15 +72,24 @@ impl View {
         (self.camera_from_scene * *place).z
     }
 
-    /// The edge or painted line that a line is: at up to two degrees, its middle within a pixel and a half.
+    /// The edge or painted line that a line is: at up to two degrees, its middle within three quarters of a pixel.
+    ///
+    /// Nearer than a pixel and a half there are edges of the walls' own patterns as well. `None` where another known line runs
+    /// within five pixels: its paint changes what is between.
     pub(crate) fn known<'a>(&self, part: &Segment, known: &'a [Segment]) -> Option<&'a Segment> {
         let (direction, middle) = (part.direction().unwrap(), part.midpoint());
-        let reach = 1.5 * self.depth(&middle) / self.camera.fx;
-        let apart = |line: &Segment| (nearest_on_segment(line, &middle) - middle).norm();
-        let along = known.iter().filter(|line| {
-            line.direction().unwrap().dot(&direction).abs() > 2.0_f64.to_radians().cos() && apart(line) < reach
-        });
-        along.min_by(|a, b| apart(a).total_cmp(&apart(b)))
+        let pixel_m = self.depth(&middle) / self.camera.fx;
+        let parallel =
+            |line: &Segment| line.direction().unwrap().dot(&direction).abs() > 2.0_f64.to_radians().cos();
+        let apart = |line: &Segment| (nearest_on_segment(line, &middle) - middle).norm() / pixel_m;
+        let mut near: Vec<&Segment> =
+            known.iter().filter(|line| parallel(line) && apart(line) < 5.0).collect();
+        near.sort_by(|a, b| apart(a).total_cmp(&apart(b)));
+        let (first, others) = near.split_first()?;
+        // A line painted on an edge is the edge.
+        let same =
+            |other: &&Segment| first.plucker().unwrap().distance_to_point(other.midpoint()) < 0.1 * pixel_m;
+        (apart(first) < 0.75 && others.iter().all(same)).then_some(*first)
     }
 
     /// The image of the endless line of a segment: `a u + b v + c` is the distance from it, pixels.
@@ -102,10 +114,11 @@ impl View {
     pub(crate) fn shows(&self, surfaces: &Surfaces, place: &Point3<f64>, slack_px: f64) -> bool {
         let (pixel, depth_m) = (self.pixel(place), self.depth(place));
         let tolerance_m = 0.001 + depth_m / self.camera.fx;
-        let steps = if slack_px > 0.0 { -2..=2 } else { 0..=0 };
-        let offset = |step: i32| f64::from(step) * slack_px / 2.0;
-        let mut around = steps.clone().flat_map(|down| steps.clone().map(move |right| (right, down)));
-        around.any(|(right, down)| {
+        let steps = if slack_px > 0.0 { FINE } else { 0 };
+        let offset = |step: i32| f64::from(step) * slack_px / f64::from(FINE);
+        // The place itself first, which mostly is the answer.
+        let around = (-steps..=steps).flat_map(|down| (-steps..=steps).map(move |right| (right, down)));
+        std::iter::once((0, 0)).chain(around).any(|(right, down)| {
             let pixel = Point2::new(pixel.x + offset(right), pixel.y + offset(down));
             let found = surfaces.depth(&self.camera, &self.scene_from_camera, pixel);
             found.is_some_and(|found| (found - depth_m).abs() <= tolerance_m)

@@ -29,9 +29,11 @@ impl Wall {
         fs::write(wall.raw("calibration.txt"), "120 100 100.0 100.0 59.5 49.5\n").unwrap();
         let mut truth = String::new();
         for frame in 0..FRAMES {
-            let pixels: Vec<u8> =
-                (0..100).flat_map(|v| (0..120).map(move |u| tone(u + frame, v))).collect();
-            save(&wall.raw(&format!("rgb/{frame}.png")), &Mat::new_rows_cols_with_data(100, 120, &pixels).unwrap());
+            let pixels: Vec<u8> = (0..100).flat_map(|v| (0..120).map(move |u| tone(u + frame, v))).collect();
+            save(
+                &wall.raw(&format!("rgb/{frame}.png")),
+                &Mat::new_rows_cols_with_data(100, 120, &pixels).unwrap(),
+            );
             write_png(&wall.raw(&format!("depth/{frame}.png")), SIZE, 16);
             writeln!(truth, "0.{frame} 0.{:02} 0 0 0 0 0 1", 2 * frame).unwrap();
         }

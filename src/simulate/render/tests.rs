@@ -390,11 +390,9 @@ fn the_bytes_do_not_depend_on_the_number_of_threads() {
 
 #[test]
 fn the_datasets_own_camera_needs_no_calibration_where_it_has_one() {
-    for (preset, layout) in [
-        ("icl-nuim", Layout::Icl),
-        ("icl-nuim", Layout::IclOriginal),
-        ("tartanair", Layout::TartanAir),
-    ] {
+    for (preset, layout) in
+        [("icl-nuim", Layout::Icl), ("icl-nuim", Layout::IclOriginal), ("tartanair", Layout::TartanAir)]
+    {
         let recipe = format!("{ROOM}\n[camera]\npreset = {preset:?}");
         let camera = Recipe::from_toml(&recipe).unwrap().camera.camera("camera").unwrap();
         let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-# make demo   build, simulate a sequence, convert the committed sample, validate both, look at them
+# make demo   build, simulate a sequence, render images and convert them, convert the committed sample, validate, look at all
 # make test   every test
 # make lint   formatting, clippy, documentation, dependencies
 

@@ -48,10 +48,21 @@ fn main() -> ExitCode {
         Command::Icl(args) => rgbd::run(Dataset::Icl, args, &mut stdout, &mut stderr),
         Command::TartanAir(args) => rgbd::run(Dataset::TartanAir, args, &mut stdout, &mut stderr),
     };
+    let result = result.and_then(|outcome| Ok(stdout.flush().map(|()| outcome)?));
     let outcome = result.unwrap_or_else(|error| {
+        // Whoever reads our output has seen enough, as `head` does.
+        if is_broken_pipe(&error) {
+            return Outcome::Done;
+        }
         // Where even stderr is closed there is nobody to tell.
         let _ = writeln!(stderr, "error: {error:#}");
         Outcome::Failed
     });
     ExitCode::from(outcome.code())
+}
+
+fn is_broken_pipe(error: &anyhow::Error) -> bool {
+    let io =
+        |cause: &(dyn std::error::Error + 'static)| cause.downcast_ref::<io::Error>().map(io::Error::kind);
+    error.chain().any(|cause| io(cause) == Some(io::ErrorKind::BrokenPipe))
 }

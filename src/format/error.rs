@@ -169,6 +169,18 @@ impl Error {
         container: &'static str,
     ) -> impl FnOnce(Box<dyn std::error::Error + Send + Sync>) -> Self {
         let path = path.to_owned();
-        move |source| Self::Container { path, container, detail: source.to_string() }
+        move |source| {
+            let mut detail = source.to_string();
+            let mut cause = source.source();
+            while let Some(error) = cause {
+                let text = error.to_string();
+                // Some say what their causes say, such as a full disk; others leave it to whoever asks.
+                if !detail.contains(&text) {
+                    detail = format!("{detail}: {text}");
+                }
+                cause = error.source();
+            }
+            Self::Container { path, container, detail }
+        }
     }
 }

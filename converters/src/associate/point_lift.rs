@@ -1,6 +1,6 @@
 //! A detected point in the world.
 
-use nalgebra::{Matrix3, Point2, Point3};
+use nalgebra::{Matrix3, Point2, Point3, Vector3};
 use open_structure::geometry::Pose;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -69,10 +69,15 @@ pub enum PointRejection {
     OnRim,
 }
 
+/// How far a surface may be from its plane, whatever the depth map says, in widths of a pixel at its depth: no detector
+/// tells more, and information stays well conditioned.
+const FLAT: f64 = 0.05;
+
 /// The point of the world that a detected point shows.
 ///
-/// Along the ray it is as uncertain as the depth, across it as the position in the image; the pose's uncertainty comes to
-/// both.
+/// An error of its position in the image moves it along the surface, an error of the depth along the ray; the pose's
+/// uncertainty comes to both. So what different views say of a point of a plane leaves it in that plane. At a rim or a crease
+/// the surface may have any slope up to 45 degrees.
 ///
 /// * `pose_sigma_m` — standard deviation of the true pose, at the point, metres.
 ///
@@ -90,22 +95,36 @@ pub fn lift_point(
     point: &DetectedPoint,
     options: &PointLandmarkOptions,
 ) -> Result<LiftedPoint, PointRejection> {
-    let focal_px = raster.camera().fx.abs();
+    let camera = raster.camera();
+    let focal_px = camera.fx.abs();
     let place: Point2<f64> = point.raster;
     let surface = depth.surface(place, focal_px, noise).ok_or(PointRejection::NoDepth)?;
     if surface.jump && options.rims == Rims::Reject {
         return Err(PointRejection::OnRim);
     }
     let in_camera = raster.back_project(place, surface.depth_m).ok_or(PointRejection::NoDepth)?;
-    let ray = world_from_camera.transform_vector(&in_camera.coords.normalize());
+    // As long as one metre of depth.
+    let ray = in_camera.coords / surface.depth_m;
     let pixel_m = surface.depth_m / focal_px;
-    let along = square(noise.sigma_m(surface.depth_m)) + square(pose_sigma_m);
-    let across = square(options.sigma_px * point.scale * pixel_m) + square(pose_sigma_m);
-    let information = Matrix3::identity() / across + ray * ray.transpose() * (1.0 / along - 1.0 / across);
-    let spread = 3.0 * (noise.sigma_m(surface.depth_m) + pose_sigma_m);
+    let sigma_m = noise.sigma_m(surface.depth_m);
+    let position = square(options.sigma_px * point.scale);
+    let mut covariance = Matrix3::identity() * square(pose_sigma_m);
+    let along = if let Some(plane) = surface.plane {
+        let right = Vector3::x() * (surface.depth_m / camera.fx) + ray * plane.slope_m.x;
+        let down = Vector3::y() * (surface.depth_m / camera.fy) + ray * plane.slope_m.y;
+        covariance += (right * right.transpose() + down * down.transpose()) * position;
+        sigma_m.max(plane.bend_m).max(FLAT * pixel_m)
+    } else {
+        covariance += Matrix3::identity() * (position * square(pixel_m));
+        sigma_m
+    };
+    covariance += ray * ray.transpose() * square(along);
+    let information = covariance.cholesky().ok_or(PointRejection::NoDepth)?.inverse();
+    let rotation = world_from_camera.rotation_matrix();
+    let spread = 3.0 * (sigma_m + pose_sigma_m);
     Ok(LiftedPoint {
         position: world_from_camera * in_camera,
-        information,
+        information: rotation * information * rotation.transpose(),
         radius_m: (options.radius_px * pixel_m + spread).min(options.max_radius_m),
         descriptor: point.descriptor,
     })

@@ -253,6 +253,10 @@ pub fn run(
     if !args.force && output.symlink_metadata().is_ok() {
         return Err(format::Error::Exists { path: output.clone() }.into());
     }
+    if replaces(output, input) {
+        writeln!(stderr, "error: {} would replace the images, {}", output.display(), input.display())?;
+        return Ok(Outcome::Misused);
+    }
 
     let stages = Stages::default();
     let update = |stage: &'static str, done: u64, total: u64| stages.update(stage, done, total);
@@ -297,6 +301,14 @@ pub fn run(
         report.render(stdout)?;
     }
     Ok(if report.frames_left_out() { Outcome::Findings } else { Outcome::Done })
+}
+
+/// Whether an output that exists is the input, or a folder that has it.
+fn replaces(output: &Path, input: &Path) -> bool {
+    match (output.canonicalize(), input.canonicalize()) {
+        (Ok(output), Ok(input)) => input.starts_with(output),
+        _ => false,
+    }
 }
 
 /// Draws some frames.

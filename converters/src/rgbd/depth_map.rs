@@ -1,6 +1,6 @@
 //! Depth of every pixel of an image.
 
-use nalgebra::{Matrix3, Point2, Vector3};
+use nalgebra::{Matrix3, Point2, Vector2, Vector3};
 
 use super::DepthNoise;
 
@@ -31,6 +31,17 @@ pub struct Surface {
     pub depth_m: f64,
     /// Whether another surface begins behind it within a pixel.
     pub jump: bool,
+    /// The plane that it is around the place; `None` at rims and creases.
+    pub plane: Option<Plane>,
+}
+
+/// A plane, as a depth map shows it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plane {
+    /// Change of depth from a pixel to the next one right, and to the next one below, metres.
+    pub slope_m: Vector2<f64>,
+    /// Greatest distance of the depths around from it, metres.
+    pub bend_m: f64,
 }
 
 /// Whether a depth map shows a point.
@@ -128,10 +139,12 @@ impl DepthMap {
         }
         let tolerance =
             |depth_m: f64, widths: f64| SIGMAS * noise.sigma_m(depth_m) + widths * depth_m / focal_px;
-        if let Some((inverse, worst)) = plane(&near)
-            && worst * middle * middle <= tolerance(middle, BEND)
-        {
-            return Some(Surface { depth_m: 1.0 / inverse, jump: false });
+        if let Some((inverse, gradient, worst)) = plane(&near) {
+            let (depth_m, bend_m) = (1.0 / inverse, worst * middle * middle);
+            if bend_m <= tolerance(middle, BEND) {
+                let plane = Plane { slope_m: gradient * (-depth_m * depth_m), bend_m };
+                return Some(Surface { depth_m, jump: false, plane: Some(plane) });
+            }
         }
         near.sort_by(|a, b| a.0.total_cmp(&b.0));
         let gaps = near.windows(2).map(|pair| pair[1].0 - pair[0].0);
@@ -141,6 +154,14 @@ impl DepthMap {
         if part.len() < 3 {
             return None;
         }
+        // The nearer surface goes on to its rim, which is up to a pixel away from what shows it. Five pixels are not on one line.
+        if jump
+            && part.len() >= 5
+            && let Some((inverse, _, worst)) = plane(part)
+            && worst * middle * middle <= tolerance(middle, BEND)
+        {
+            return Some(Surface { depth_m: 1.0 / inverse, jump, plane: None });
+        }
         // Near pixels count most; the one at the place itself all but alone.
         let (mut sum, mut weights) = (0.0, 0.0);
         for (depth, [x, y]) in part {
@@ -148,7 +169,7 @@ impl DepthMap {
             sum += weight / depth;
             weights += weight;
         }
-        Some(Surface { depth_m: weights / sum, jump })
+        Some(Surface { depth_m: weights / sum, jump, plane: None })
     }
 
     /// Whether the map shows a point.
@@ -214,8 +235,8 @@ fn floor(value: f64) -> i64 {
     (value.floor() as i64).clamp(i64::MIN / 2, i64::MAX / 2)
 }
 
-/// Least-squares plane through inverse depths: its value at the origin, and the largest distance from it.
-fn plane(near: &[(f64, [f64; 2])]) -> Option<(f64, f64)> {
+/// Least-squares plane through inverse depths: its value at the origin, its gradient, and the largest distance from it.
+fn plane(near: &[(f64, [f64; 2])]) -> Option<(f64, Vector2<f64>, f64)> {
     let mut normal = Matrix3::zeros();
     let mut right = Vector3::zeros();
     for (depth, [x, y]) in near {
@@ -228,7 +249,7 @@ fn plane(near: &[(f64, [f64; 2])]) -> Option<(f64, f64)> {
         .iter()
         .map(|(depth, [x, y])| (solution.dot(&Vector3::new(1.0, *x, *y)) - 1.0 / depth).abs())
         .fold(0.0, f64::max);
-    (solution.x > 0.0).then_some((solution.x, worst))
+    (solution.x > 0.0).then_some((solution.x, Vector2::new(solution.y, solution.z), worst))
 }
 
 #[cfg(test)]
@@ -253,6 +274,9 @@ mod tests {
             assert!(!surface.jump);
             // The map's numbers have 24 binary digits.
             assert!((surface.depth_m * inverse(u, v) - 1.0).abs() < 1e-6, "{surface:?}");
+            let plane = surface.plane.unwrap();
+            let slope = Vector2::new(-0.01, 0.004) * surface.depth_m.powi(2);
+            assert!((plane.slope_m - slope).norm() < 1e-6 && plane.bend_m < 1e-6, "{plane:?}");
             let sight = |depth| map.sight(Point2::new(u, v), depth, FOCAL_PX, &EXACT, 1);
             assert_eq!(sight(surface.depth_m), Sight::Seen);
             assert_eq!(sight(surface.depth_m * 1.3), Sight::Hidden);
@@ -262,20 +286,26 @@ mod tests {
 
     #[test]
     fn at_a_rim_the_nearer_surface_counts_and_both_are_seen() {
-        let map = map(|u, _| if u < 10.0 { 1.0 } else { 4.0 });
+        let rim = map(|u, _| if u < 10.0 { 1.0 } else { 4.0 });
         for u in [9.2, 9.4, 9.6, 10.4] {
             let raster = Point2::new(u, 8.0);
-            let surface = map.surface(raster, FOCAL_PX, &EXACT).unwrap();
+            let surface = rim.surface(raster, FOCAL_PX, &EXACT).unwrap();
             assert!(surface.jump && (surface.depth_m - 1.0).abs() < 1e-9, "{u} {surface:?}");
+            assert_eq!(surface.plane, None);
         }
+        // A nearer surface that slants goes on to the rim.
+        let inverse = |u: f64| 0.8 - 0.03 * u;
+        let slanted = map(|u, _| if u < 9.5 { 1.0 / inverse(u) } else { 8.0 });
+        let surface = slanted.surface(Point2::new(9.4, 8.0), FOCAL_PX, &EXACT).unwrap();
+        assert!(surface.jump && (surface.depth_m * inverse(9.4) - 1.0).abs() < 1e-6, "{surface:?}");
         let raster = Point2::new(9.5, 8.0);
-        let sight = |depth| map.sight(raster, depth, FOCAL_PX, &EXACT, 1);
+        let sight = |depth| rim.sight(raster, depth, FOCAL_PX, &EXACT, 1);
         assert_eq!(
             [sight(1.0), sight(4.0), sight(2.0), sight(5.0), sight(0.5)],
             [Sight::Seen, Sight::Seen, Sight::Hidden, Sight::Hidden, Sight::Absent]
         );
-        assert_eq!(map.sight(Point2::new(5.0, 8.0), 4.0, FOCAL_PX, &EXACT, 1), Sight::Hidden);
-        assert!(!map.surface(Point2::new(5.0, 8.0), FOCAL_PX, &EXACT).unwrap().jump);
+        assert_eq!(rim.sight(Point2::new(5.0, 8.0), 4.0, FOCAL_PX, &EXACT, 1), Sight::Hidden);
+        assert!(!rim.surface(Point2::new(5.0, 8.0), FOCAL_PX, &EXACT).unwrap().jump);
     }
 
     #[test]

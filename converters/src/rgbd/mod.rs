@@ -26,7 +26,7 @@ pub mod tartanair;
 mod true_poses;
 pub mod tum;
 
-pub use depth_map::{DepthMap, Sight, Surface};
+pub use depth_map::{DepthMap, Plane, Sight, Surface};
 pub use depth_noise::DepthNoise;
 pub use error::Error;
 pub use images::Images;

@@ -16,8 +16,11 @@ fn published(layout: Layout) -> Result<Camera, Error> {
     CameraRecipe { preset, ..CameraRecipe::default() }.camera("camera")
 }
 
-/// Writes `calibration.txt` if the camera is not the dataset's own: one line
-/// `width height fx fy cx cy`, pixels, counted from where the dataset counts.
+/// Writes `calibration.txt` where a reader cannot know the camera: one line `width height fx fy cx cy`, pixels, counted
+/// from where the dataset counts.
+///
+/// TUM RGB-D has three cameras, told by the folder's name, which is not ours to give: it always has the file. The
+/// others have one camera, and the file if the recipe's is another.
 pub(super) fn write(folder: &Path, layout: Layout, camera: &Camera) -> Result<(), Error> {
     let published = published(layout)?;
     let numbers = |camera: &Camera| {
@@ -28,7 +31,7 @@ pub(super) fn write(folder: &Path, layout: Layout, camera: &Camera) -> Result<()
         (*width, *height, [*fx, *fy, cx + shift, cy + shift])
     };
     let (width, height, [fx, fy, cx, cy]) = numbers(camera);
-    if (width, height, [fx, fy, cx, cy]) == numbers(&published) {
+    if layout != Layout::Tum && (width, height, [fx, fy, cx, cy]) == numbers(&published) {
         return Ok(());
     }
     let origin = if published.pixel_origin == registry::PIXEL_CORNER {

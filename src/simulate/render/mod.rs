@@ -98,8 +98,8 @@ trait Dataset {
 
 /// Renders frames of a simulated sequence into a folder, in the layout of a dataset.
 ///
-/// Pictures show the recipe's camera. Where that is not the dataset's own, `calibration.txt` is written beside,
-/// in the dataset's convention of where pixels are counted from. The true poses are those of every frame,
+/// Pictures show the recipe's camera. Where that is not the dataset's own, and always for TUM RGB-D, which has
+/// three, `calibration.txt` is written beside, in the dataset's convention of where pixels are counted from. The true poses are those of every frame,
 /// rendered or not, where the dataset's own are denser than its images (TUM RGB-D, ICL-NUIM), and of the
 /// rendered frames where they go by line (TartanAir).
 ///

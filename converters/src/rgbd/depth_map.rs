@@ -125,6 +125,23 @@ impl DepthMap {
     pub fn surface(&self, raster: Point2<f64>, focal_px: f64, noise: &DepthNoise) -> Option<Surface> {
         let (column, row) = nearest(raster)?;
         let middle = self.at(column, row)?;
+        let tolerance =
+            |depth_m: f64, widths: f64| SIGMAS * noise.sigma_m(depth_m) + widths * depth_m / focal_px;
+        let smooth = |(inverse, gradient, worst): (f64, Vector2<f64>, f64)| {
+            let (depth_m, bend_m) = (1.0 / inverse, worst * middle * middle);
+            let plane = Plane { slope_m: gradient * (-depth_m * depth_m), bend_m };
+            (bend_m <= tolerance(middle, BEND)).then_some(Surface {
+                depth_m,
+                jump: false,
+                plane: Some(plane),
+            })
+        };
+        if let Some(square) = self.square(column, row) {
+            let offset = Vector2::new(raster.x - column as f64, raster.y - row as f64);
+            if let Some(surface) = square_plane(&square, offset).and_then(smooth) {
+                return Some(surface);
+            }
+        }
         let mut near: Vec<(f64, [f64; 2])> = Vec::with_capacity(9);
         for neighbour_row in row - 1..=row + 1 {
             for neighbour_column in column - 1..=column + 1 {
@@ -137,14 +154,10 @@ impl DepthMap {
         if near.len() < 6 {
             return None;
         }
-        let tolerance =
-            |depth_m: f64, widths: f64| SIGMAS * noise.sigma_m(depth_m) + widths * depth_m / focal_px;
-        if let Some((inverse, gradient, worst)) = plane(&near) {
-            let (depth_m, bend_m) = (1.0 / inverse, worst * middle * middle);
-            if bend_m <= tolerance(middle, BEND) {
-                let plane = Plane { slope_m: gradient * (-depth_m * depth_m), bend_m };
-                return Some(Surface { depth_m, jump: false, plane: Some(plane) });
-            }
+        if near.len() < 9
+            && let Some(surface) = plane(&near).and_then(smooth)
+        {
+            return Some(surface);
         }
         near.sort_by(|a, b| a.0.total_cmp(&b.0));
         let gaps = near.windows(2).map(|pair| pair[1].0 - pair[0].0);
@@ -170,6 +183,15 @@ impl DepthMap {
             weights += weight;
         }
         Some(Surface { depth_m: weights / sum, jump, plane: None })
+    }
+
+    /// Inverse depths of a pixel and the eight around it, row by row, where all have one.
+    fn square(&self, column: i64, row: i64) -> Option<[f64; 9]> {
+        let mut square = [0.0; 9];
+        for (place, inverse) in (0..).zip(&mut square) {
+            *inverse = 1.0 / self.at(column + place % 3 - 1, row + place / 3 - 1)?;
+        }
+        Some(square)
     }
 
     /// Whether the map shows a point.
@@ -233,6 +255,23 @@ fn nearest(raster: Point2<f64>) -> Option<(i64, i64)> {
 fn floor(value: f64) -> i64 {
     // Half of the range leaves room for neighbours.
     (value.floor() as i64).clamp(i64::MIN / 2, i64::MAX / 2)
+}
+
+/// Least-squares plane through the nine inverse depths of a square: its value at an offset from the middle, its gradient, and
+/// the largest distance from it. The square's symmetry leaves three sums.
+fn square_plane(square: &[f64; 9], offset: Vector2<f64>) -> Option<(f64, Vector2<f64>, f64)> {
+    let [a, b, c, d, e, f, g, h, i] = *square;
+    let mean = (a + b + c + d + e + f + g + h + i) / 9.0;
+    let gradient = Vector2::new((c + f + i) - (a + d + g), (g + h + i) - (a + b + c)) / 6.0;
+    let mut worst = 0.0_f64;
+    for (row, values) in square.chunks_exact(3).enumerate() {
+        for (column, value) in values.iter().enumerate() {
+            let plane = mean + gradient.x * (column as f64 - 1.0) + gradient.y * (row as f64 - 1.0);
+            worst = worst.max((plane - value).abs());
+        }
+    }
+    let inverse = mean + gradient.dot(&offset);
+    (inverse > 0.0).then_some((inverse, gradient, worst))
 }
 
 /// Least-squares plane through inverse depths: its value at the origin, its gradient, and the largest distance from it.
@@ -327,6 +366,23 @@ mod tests {
             assert_eq!(map.sight(raster, 2.0, FOCAL_PX, &EXACT, 2), Sight::Unknown);
         }
         assert!((map.coverage() - (1.0 - 9.0 / 400.0)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_plane_of_a_square_is_that_of_any_nine_places() {
+        let mut random = open_structure::simulate::Random::new(1, "square", 0);
+        for _ in 0..100 {
+            let square: [f64; 9] = std::array::from_fn(|_| random.between(0.2, 2.0));
+            let offset = Vector2::new(random.between(-0.5, 0.5), random.between(-0.5, 0.5));
+            let places = square.iter().enumerate().map(|(place, inverse)| {
+                let (x, y) = ((place % 3) as f64 - 1.0, (place / 3) as f64 - 1.0);
+                (1.0 / inverse, [x - offset.x, y - offset.y])
+            });
+            let (value, gradient, worst) = plane(&places.collect::<Vec<_>>()).unwrap();
+            let found = square_plane(&square, offset).unwrap();
+            assert!((found.0 - value).abs() < 1e-12 && (found.1 - gradient).amax() < 1e-12);
+            assert!((found.2 - worst).abs() < 1e-12);
+        }
     }
 
     #[test]

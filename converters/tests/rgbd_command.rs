@@ -44,7 +44,7 @@ fn a_folder_becomes_a_sequence_without_findings_in_both_encodings() {
         assert!(report.findings.is_empty(), "{:?}", report.findings);
     }
     assert_eq!(names(wall.place()), ["a", "a.mcap", "raw"]);
-    let [first, second] = ["a.mcap", "a"].map(|name| format::read(&wall.place().join(name)).unwrap());
+    let [first, second] = ["a.mcap", "a"].map(|name| format::read(wall.place().join(name)).unwrap());
     assert_eq!(first, second);
     assert_eq!(first.manifest.name, "wall");
     let [frames, points, lines] = counts(&wall.place().join("a"));
@@ -264,7 +264,7 @@ fn a_configuration_is_read_held_against_its_ranges_and_printed_again() {
 
     config("seed = 7\n[points]\nmax_features = 12\n");
     assert_eq!(convert().0, 0);
-    let read = format::read(&wall.place().join("a.mcap")).unwrap();
+    let read = format::read(wall.place().join("a.mcap")).unwrap();
     assert_eq!(read.manifest.generator.seed, Some(7));
     let arguments = ["icl", "--print-config", "--config", "a.toml"];
     let (code, printed, err) = os_convert(wall.place(), &arguments);
@@ -282,7 +282,7 @@ fn frames_stride_and_features_choose() {
         let arguments = ["tum", "raw", "-o", "a.mcap", "--force"];
         let (code, _, err) = os_convert(wall.place(), &[&arguments[..], more].concat());
         assert_eq!(code, 0, "{err}");
-        format::read(&wall.place().join("a.mcap")).unwrap()
+        format::read(wall.place().join("a.mcap")).unwrap()
     };
     let ids =
         |sequence: &Sequence| -> Vec<i64> { sequence.frames.iter().map(|frame| frame.frame_id.0).collect() };

@@ -14,7 +14,7 @@ pub(crate) fn bias_px(room: &Room, sequence: &Generated) -> Vector2<f64> {
         for (_, part) in view.lines() {
             let Some(line) = view.known(&part, &known) else { continue };
             let across = view.image(line).xy();
-            let off = view.from_line_px(&part.midpoint(), line);
+            let off = view.off_line_px(&part.midpoint(), line);
             normal += across * across.transpose();
             right += across * off;
         }

@@ -86,7 +86,7 @@ fn observations_are_where_the_surfaces_appear() {
                 let off = along(&part).map(|place| apart(&place, &surfaces.nearest(&place)));
                 count(&mut lines, off.fold(0.0, f64::max));
                 if let Some(truth) = view.known(&part, &known) {
-                    let off = [part.start, part.end].map(|end| view.from_line_px(&end, truth).abs());
+                    let off = [part.start, part.end].map(|end| view.off_line_px(&end, truth).abs());
                     count(&mut marked, off[0].max(off[1]));
                 }
             }

@@ -104,7 +104,7 @@ impl View {
     }
 
     /// How far a place appears from the image of a line, pixels; the sign tells the side.
-    pub(crate) fn from_line_px(&self, place: &Point3<f64>, line: &Segment) -> f64 {
+    pub(crate) fn off_line_px(&self, place: &Point3<f64>, line: &Segment) -> f64 {
         let pixel = self.pixel(place);
         self.image(line).dot(&Vector3::new(pixel.x, pixel.y, 1.0))
     }

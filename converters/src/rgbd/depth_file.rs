@@ -6,6 +6,7 @@ use npyz::{DType, NpyHeader, Order};
 use open_structure::geometry::PinholeCamera;
 use opencv::core::{Mat, MatTraitConstManual, Vec4b};
 
+use super::depth_map::Samples;
 use super::picture::{self, PngKind};
 use super::{DepthFormat, Error};
 
@@ -16,13 +17,13 @@ const MAX_HEADER: usize = 1024;
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Image`] for what is not of the format or not as large as the camera's image.
-pub(super) fn read(path: &Path, format: DepthFormat, camera: &PinholeCamera) -> Result<Vec<f32>, Error> {
+pub(super) fn read(path: &Path, format: DepthFormat, camera: &PinholeCamera) -> Result<Samples, Error> {
     let size = [camera.width, camera.height];
     match format {
-        DepthFormat::Png { steps_per_metre } => steps(path, size, steps_per_metre),
+        DepthFormat::Png { steps_per_metre } => steps(path, size, steps_per_metre).map(Samples::Metres),
         DepthFormat::Npy => array(path, size),
-        DepthFormat::FloatPng => float_picture(path, size),
-        DepthFormat::RayText { units_per_metre } => rays(path, camera, units_per_metre),
+        DepthFormat::FloatPng => float_picture(path, size).map(Samples::Metres),
+        DepthFormat::RayText { units_per_metre } => rays(path, camera, units_per_metre).map(Samples::Metres),
     }
 }
 
@@ -52,7 +53,7 @@ fn numbers<'a, T: opencv::core::DataType>(path: &Path, picture: &'a Mat) -> Resu
 }
 
 /// A NumPy array of 32-bit floating point numbers, rows then columns.
-fn array(path: &Path, [width, height]: [u32; 2]) -> Result<Vec<f32>, Error> {
+fn array(path: &Path, [width, height]: [u32; 2]) -> Result<Samples, Error> {
     let expected = format!("a NumPy array of 32-bit floating point numbers (<f4), shape ({height}, {width})");
     let wrong = |found: String| Error::image(path, &expected, found);
     let bytes = picture::bytes(path, [width, height])?;
@@ -72,7 +73,7 @@ fn array(path: &Path, [width, height]: [u32; 2]) -> Result<Vec<f32>, Error> {
     if data.len() != pixels * 4 {
         return Err(wrong(format!("{} B of numbers", data.len())));
     }
-    Ok(data.as_chunks::<4>().0.iter().map(|number| f32::from_le_bytes(*number)).collect())
+    Ok(Samples::LittleEndian { bytes, begin: length })
 }
 
 /// Bytes before the numbers of an array; `None` for another kind of file, or more than any array has.

@@ -13,13 +13,46 @@ const JUMP: f64 = 3.0;
 /// How far a surface may be from where its landmark lies, in widths of a pixel.
 const NEAR: f64 = 1.0;
 
+/// Depths row by row, metres, as a file has them: of most pixels nobody ever asks.
+#[derive(Clone, Debug)]
+pub(super) enum Samples {
+    /// Numbers.
+    Metres(Vec<f32>),
+    /// 32-bit floating point numbers, the lowest byte first, that follow some other bytes.
+    LittleEndian {
+        /// The whole file.
+        bytes: Vec<u8>,
+        /// Where the numbers begin.
+        begin: usize,
+    },
+}
+
+impl Samples {
+    fn len(&self) -> usize {
+        match self {
+            Self::Metres(depths) => depths.len(),
+            Self::LittleEndian { bytes, begin } => bytes.len().saturating_sub(*begin) / 4,
+        }
+    }
+
+    fn at(&self, index: usize) -> f32 {
+        match self {
+            Self::Metres(depths) => depths[index],
+            Self::LittleEndian { bytes, begin } => {
+                let number = &bytes[begin + 4 * index..][..4];
+                f32::from_le_bytes([number[0], number[1], number[2], number[3]])
+            }
+        }
+    }
+}
+
 /// Depth along the optical axis of every pixel of an image, metres.
 #[derive(Clone, Debug)]
 pub struct DepthMap {
     width: usize,
     height: usize,
-    /// Row by row, as the file has them; those outside `range_m` are none.
-    depth_m: Vec<f32>,
+    /// As the file has them; those outside `range_m` are none.
+    samples: Samples,
     /// Depths that count, all of them finite and positive.
     range_m: [f32; 2],
 }
@@ -65,11 +98,16 @@ impl DepthMap {
     /// `None` where the numbers do not fill the image.
     #[must_use]
     pub fn new(width: u32, height: u32, depth_m: Vec<f32>) -> Option<Self> {
+        Self::of(width, height, Samples::Metres(depth_m))
+    }
+
+    /// As [`new`](Self::new), of the numbers of a file.
+    pub(super) fn of(width: u32, height: u32, samples: Samples) -> Option<Self> {
         let (width, height) = (width as usize, height as usize);
-        if width == 0 || height == 0 || width.checked_mul(height)? != depth_m.len() {
+        if width == 0 || height == 0 || width.checked_mul(height)? != samples.len() {
             return None;
         }
-        Some(Self { width, height, depth_m, range_m: [f32::from_bits(1), f32::MAX] })
+        Some(Self { width, height, samples, range_m: [f32::from_bits(1), f32::MAX] })
     }
 
     /// Columns and rows.
@@ -83,7 +121,7 @@ impl DepthMap {
     pub fn at(&self, column: i64, row: i64) -> Option<f64> {
         let column = usize::try_from(column).ok().filter(|column| *column < self.width)?;
         let row = usize::try_from(row).ok().filter(|row| *row < self.height)?;
-        let depth = self.depth_m[row * self.width + column];
+        let depth = self.samples.at(row * self.width + column);
         self.counts(depth).then(|| f64::from(depth))
     }
 
@@ -108,7 +146,8 @@ impl DepthMap {
     /// Part of the pixels that have a depth.
     #[must_use]
     pub fn coverage(&self) -> f64 {
-        self.depth_m.iter().filter(|depth| self.counts(**depth)).count() as f64 / self.depth_m.len() as f64
+        (0..self.samples.len()).filter(|index| self.counts(self.samples.at(*index))).count() as f64
+            / self.samples.len() as f64
     }
 
     /// The nearest surface at a place between pixels.
@@ -397,6 +436,20 @@ mod tests {
         assert_eq!(there(&map), [true, false, true, false, true]);
         map.limit(2.0, 1.0);
         assert_eq!(there(&map), [false; 5]);
+    }
+
+    #[test]
+    fn numbers_are_the_same_as_bytes_of_a_file() {
+        let depths: Vec<f32> = (1..=6_u8).map(|depth| f32::from(depth) * 0.3).collect();
+        let bytes =
+            [7, 7, 7].into_iter().chain(depths.iter().flat_map(|depth| depth.to_le_bytes())).collect();
+        let map = DepthMap::of(3, 2, Samples::LittleEndian { bytes, begin: 3 }).unwrap();
+        let numbers = DepthMap::new(3, 2, depths).unwrap();
+        for (column, row) in [(0, 0), (2, 0), (0, 1), (2, 1)] {
+            assert!(map.at(column, row).is_some());
+            assert_eq!(map.at(column, row), numbers.at(column, row));
+        }
+        assert!(DepthMap::of(3, 2, Samples::LittleEndian { bytes: vec![0; 26], begin: 3 }).is_none());
     }
 
     #[test]

@@ -36,9 +36,9 @@ impl RawSequence {
     /// # Errors
     /// Those of [`images`](Self::images).
     pub fn depth(&self, frame: &RawFrame) -> Result<DepthMap, Error> {
-        let depth_m = depth_file::read(&frame.depth, self.depth_format, &self.camera.projection())?;
+        let samples = depth_file::read(&frame.depth, self.depth_format, &self.camera.projection())?;
         let (width, height) = (self.camera.width, self.camera.height);
-        let mut map = DepthMap::new(width, height, depth_m)
+        let mut map = DepthMap::of(width, height, samples)
             .ok_or_else(|| Error::image(&frame.depth, "a depth for each pixel", "another count"))?;
         map.limit(self.camera.depth_min.unwrap_or(0.0), self.camera.depth_max.unwrap_or(f64::INFINITY));
         Ok(map)

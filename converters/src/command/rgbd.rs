@@ -1,7 +1,7 @@
 //! `os-convert tum`, `icl` and `tartanair`: sequences made of RGB-D images.
 
 use super::Outcome;
-use super::parse::{assignment, frame_range, given_camera};
+use super::parse::{assignment, frame_range, given_camera, sequence_name};
 use super::stages::Stages;
 use super::unpacked::Input;
 use crate::detect::Detector;
@@ -55,7 +55,7 @@ pub struct Args {
     #[arg(short, long, value_name = "OUT", required_unless_present = "print_config")]
     output: Option<PathBuf>,
     /// Name of the sequence; by default that of the dataset's
-    #[arg(long)]
+    #[arg(long, value_parser = sequence_name)]
     name: Option<String>,
     /// Recipe of the sequence, by name or file (see `os fetch`): its name, origin, licence and camera
     #[arg(long, value_name = "NAME|FILE")]
@@ -252,6 +252,7 @@ pub fn run(
     if !args.force && output.symlink_metadata().is_ok() {
         return Err(format::Error::Exists { path: output.clone() }.into());
     }
+    spare(input, output)?;
 
     let stages = Stages::default();
     let update = |stage: &'static str, done: u64, total: u64| stages.update(stage, done, total);
@@ -296,6 +297,20 @@ pub fn run(
         report.render(stdout)?;
     }
     Ok(if report.frames_left_out() { Outcome::Findings } else { Outcome::Done })
+}
+
+/// Refuses an output that would take the place of what is read, or of a part of it.
+fn spare(input: &Path, output: &Path) -> anyhow::Result<()> {
+    let (Ok(input), Ok(found)) = (input.canonicalize(), output.canonicalize()) else { return Ok(()) };
+    if input.starts_with(&found) {
+        anyhow::bail!("{}: is the input itself, or holds it", output.display());
+    }
+    let is_sequence = found.join("sequence.json").is_file()
+        || (found.is_file() && Encoding::of_output(&found) == Encoding::Mcap);
+    if found.starts_with(&input) && !is_sequence {
+        anyhow::bail!("{}: is a part of the input", output.display());
+    }
+    Ok(())
 }
 
 /// Draws some frames.

@@ -214,6 +214,11 @@ mod tests {
     use open_structure::geometry::angle_between;
     use proptest::prelude::*;
 
+    /// Options by which two lines are a group.
+    fn of_two() -> GroupOptions {
+        GroupOptions { least: 2, ..GroupOptions::default() }
+    }
+
     /// Lines around some directions: which direction, the error of theirs, midpoint, length.
     type Made = Vec<(usize, [f64; 3], [f64; 3], f64)>;
 
@@ -322,7 +327,7 @@ mod tests {
                 lines.push(Segment { start, end: start + direction * 30.0 });
             }
             // Metres: room for lines of 30 m to be turned.
-            let options = GroupOptions { shift_m: 1.0, ..GroupOptions::default() };
+            let options = GroupOptions { shift_m: 1.0, ..of_two() };
             let groups = group_lines(&mut lines, &options);
             let manhattan: Vec<&Group> = groups.iter().filter(|group| group.kind == registry::MANHATTAN).collect();
             prop_assert_eq!(manhattan.len(), 1);
@@ -360,7 +365,7 @@ mod tests {
     #[test]
     fn an_upright_and_several_level_directions_are_an_atlanta() {
         let kinds = |directions: &[[f64; 3]]| {
-            let groups = group_lines(&mut pairs(directions), &GroupOptions::default());
+            let groups = group_lines(&mut pairs(directions), &of_two());
             groups.into_iter().filter(|group| group.kind != registry::PARALLEL).collect::<Vec<_>>()
         };
         let upright = [0.001, 0.0, 1.0];
@@ -399,7 +404,7 @@ mod tests {
         let mut lines = vec![Segment { start: here, end: here }; 2];
         lines.extend([Segment { start: nowhere, end: here }; 2]);
         lines.extend(pairs(&[[1.0, 0.0, 0.0]]));
-        let groups = group_lines(&mut lines, &GroupOptions::default());
+        let groups = group_lines(&mut lines, &of_two());
         assert_eq!(groups.iter().map(|group| group.members.clone()).collect::<Vec<_>>(), [[4, 5]]);
         assert!(group_lines(&mut [], &GroupOptions::default()).is_empty());
     }

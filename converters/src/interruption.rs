@@ -13,7 +13,7 @@ pub(crate) fn working() -> RwLockReadGuard<'static, ()> {
 /// Waits until `OpenCV` works on no thread; it begins on none as long as this is held.
 ///
 /// For a program that is about to end while other threads go on.
-#[must_use]
+#[must_use = "without it nothing rests"]
 pub fn rest() -> RwLockWriteGuard<'static, ()> {
     WORKING.write().unwrap_or_else(PoisonError::into_inner)
 }

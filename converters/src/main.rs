@@ -3,6 +3,7 @@
 use clap::Parser;
 use open_structure_converters::command::rgbd::{self, Dataset};
 use open_structure_converters::command::{Outcome, text_release};
+use open_structure_converters::interruption;
 use std::io::{self, Write as _};
 use std::process::ExitCode;
 
@@ -37,6 +38,7 @@ fn main() -> ExitCode {
     let cli = Cli::parse();
     // Without a handler an interrupted program merely leaves a temporary file behind.
     let _ = ctrlc::set_handler(|| {
+        let _rest = interruption::rest();
         open_structure::format::discard_unfinished();
         std::process::exit(130);
     });

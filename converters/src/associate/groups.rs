@@ -214,8 +214,8 @@ mod tests {
     use open_structure::geometry::angle_between;
     use proptest::prelude::*;
 
-    /// Groups of two lines and more.
-    fn of_pairs() -> GroupOptions {
+    /// Options by which two lines are a group.
+    fn of_two() -> GroupOptions {
         GroupOptions { least: 2, ..GroupOptions::default() }
     }
 
@@ -254,7 +254,7 @@ mod tests {
             let rotation = turned(angles);
             let places = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.7, 0.7, 0.0], [0.05, 1.0, 0.0]];
             let lines = build(&made, &places.map(|place| rotation * Vector3::from(place)));
-            let options = of_pairs();
+            let options = of_two();
             let mut first = lines.clone();
             let groups = group_lines(&mut first, &options);
             let mut order: Vec<usize> = (0..lines.len()).collect();
@@ -286,7 +286,7 @@ mod tests {
             let rotation = turned(angles);
             let places = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.7, 0.7, 0.0], [0.05, 1.0, 0.0]];
             let lines = build(&made, &places.map(|place| rotation * Vector3::from(place)));
-            let options = of_pairs();
+            let options = of_two();
             let mut after = lines.clone();
             let groups = group_lines(&mut after, &options);
             let parallel: Vec<&Group> = groups.iter().filter(|group| group.kind == registry::PARALLEL).collect();
@@ -327,7 +327,7 @@ mod tests {
                 lines.push(Segment { start, end: start + direction * 30.0 });
             }
             // Metres: room for lines of 30 m to be turned.
-            let options = GroupOptions { shift_m: 1.0, ..of_pairs() };
+            let options = GroupOptions { shift_m: 1.0, ..of_two() };
             let groups = group_lines(&mut lines, &options);
             let manhattan: Vec<&Group> = groups.iter().filter(|group| group.kind == registry::MANHATTAN).collect();
             prop_assert_eq!(manhattan.len(), 1);
@@ -365,7 +365,7 @@ mod tests {
     #[test]
     fn an_upright_and_several_level_directions_are_an_atlanta() {
         let kinds = |directions: &[[f64; 3]]| {
-            let groups = group_lines(&mut pairs(directions), &of_pairs());
+            let groups = group_lines(&mut pairs(directions), &of_two());
             groups.into_iter().filter(|group| group.kind != registry::PARALLEL).collect::<Vec<_>>()
         };
         let upright = [0.001, 0.0, 1.0];
@@ -384,7 +384,7 @@ mod tests {
 
     #[test]
     fn a_long_line_that_would_move_far_stays_out_of_the_group() {
-        let options = of_pairs();
+        let options = of_two();
         let mut lines = pairs(&[[1.0, 0.0, 0.0]]);
         // Two degrees off: 0.1 m moves by 1.7 mm, 10 m by 17 cm.
         let beside = |length: f64, slope: f64| {
@@ -404,8 +404,8 @@ mod tests {
         let mut lines = vec![Segment { start: here, end: here }; 2];
         lines.extend([Segment { start: nowhere, end: here }; 2]);
         lines.extend(pairs(&[[1.0, 0.0, 0.0]]));
-        let groups = group_lines(&mut lines, &of_pairs());
+        let groups = group_lines(&mut lines, &of_two());
         assert_eq!(groups.iter().map(|group| group.members.clone()).collect::<Vec<_>>(), [[4, 5]]);
-        assert!(group_lines(&mut [], &of_pairs()).is_empty());
+        assert!(group_lines(&mut [], &of_two()).is_empty());
     }
 }

@@ -19,6 +19,14 @@ pub(super) fn frame_range(text: &str) -> Result<Range<u64>, String> {
     }
 }
 
+/// Name of a sequence, as the specification has it.
+pub(super) fn sequence_name(text: &str) -> Result<String, String> {
+    if text.is_empty() || text.contains(|c: char| c == '/' || c == '\\' || c.is_control()) {
+        return Err("expected a name without `/`, `\\` and control characters".to_owned());
+    }
+    Ok(text.to_owned())
+}
+
 /// `NAME=VALUE`.
 pub(super) fn assignment(text: &str) -> Result<(String, f64), String> {
     let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE, such as sigma_px=0.5")?;
@@ -59,6 +67,14 @@ mod tests {
         assert_eq!(frame_range("3.."), Ok(3..u64::MAX));
         for wrong in ["", "3", "5..3", "3..3", "a..b", "-1..3", "1...3", "1..=3"] {
             assert!(frame_range(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn names_are_those_of_the_specification() {
+        assert_eq!(sequence_name("my desk, ü"), Ok("my desk, ü".to_owned()));
+        for wrong in ["", "a/b", "a\\b", "a\nb"] {
+            assert!(sequence_name(wrong).is_err(), "{wrong:?}");
         }
     }
 

@@ -1,7 +1,7 @@
 //! `os-convert tum`, `icl` and `tartanair`: sequences made of RGB-D images.
 
 use super::Outcome;
-use super::parse::{assignment, frame_range, given_camera};
+use super::parse::{assignment, frame_range, given_camera, sequence_name};
 use super::stages::Stages;
 use super::unpacked::Input;
 use crate::detect::Detector;
@@ -55,7 +55,7 @@ pub struct Args {
     #[arg(short, long, value_name = "OUT", required_unless_present = "print_config")]
     output: Option<PathBuf>,
     /// Name of the sequence; by default that of the dataset's
-    #[arg(long)]
+    #[arg(long, value_parser = sequence_name)]
     name: Option<String>,
     /// Recipe of the sequence, by name or file (see `os fetch`): its name, origin, licence and camera
     #[arg(long, value_name = "NAME|FILE")]
@@ -253,8 +253,8 @@ pub fn run(
     if !args.force && output.symlink_metadata().is_ok() {
         return Err(format::Error::Exists { path: output.clone() }.into());
     }
-    if replaces(output, input) {
-        writeln!(stderr, "error: {} would replace the images, {}", output.display(), input.display())?;
+    if let Some(what) = replaced(input, output) {
+        writeln!(stderr, "error: {} would replace the images: it is {what}", output.display())?;
         return Ok(Outcome::Misused);
     }
 
@@ -303,12 +303,15 @@ pub fn run(
     Ok(if report.frames_left_out() { Outcome::Findings } else { Outcome::Done })
 }
 
-/// Whether an output that exists is the input, or a folder that has it.
-fn replaces(output: &Path, input: &Path) -> bool {
-    match (output.canonicalize(), input.canonicalize()) {
-        (Ok(output), Ok(input)) => input.starts_with(output),
-        _ => false,
+/// What of the input an output would take the place of, if any.
+fn replaced(input: &Path, output: &Path) -> Option<&'static str> {
+    let (input, found) = (input.canonicalize().ok()?, output.canonicalize().ok()?);
+    if input.starts_with(&found) {
+        return Some("the input itself, or holds it");
     }
+    let is_sequence = found.join("sequence.json").is_file()
+        || (found.is_file() && Encoding::of_output(&found) == Encoding::Mcap);
+    (found.starts_with(&input) && !is_sequence).then_some("a part of the input")
 }
 
 /// Draws some frames.

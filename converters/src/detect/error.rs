@@ -12,6 +12,15 @@ pub enum Error {
         depth: i32,
     },
     /// A detector failed.
-    #[error("detector: {0}")]
-    OpenCv(#[from] opencv::Error),
+    #[error("detector: {cause}")]
+    OpenCv {
+        /// Why.
+        cause: opencv::Error,
+    },
+}
+
+impl From<opencv::Error> for Error {
+    fn from(cause: opencv::Error) -> Self {
+        Self::OpenCv { cause }
+    }
 }

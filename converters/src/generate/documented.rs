@@ -119,6 +119,13 @@ mod tests {
     }
 
     #[test]
+    fn the_ends_of_a_range_are_in_it() {
+        for text in ["[points]\nscale_factor = 1.01", "[points]\nscale_factor = 4.0"] {
+            assert!(Options::from_toml(text).is_ok(), "{text}");
+        }
+    }
+
+    #[test]
     fn wrong_options_are_named() {
         for (text, place) in [
             ("points.max_features = 1e9", "configuration"),
@@ -126,6 +133,8 @@ mod tests {
             ("[lines]\nsight_part = -0.5", "lines.sight_part"),
             ("[lines]\nno_such = 1", "no_such"),
             ("[noise]\nmodel = \"paper\"\nsigma_depth_m = 1.0", "noise"),
+            ("[segments]\ncanny = [50.0, 0.0]", "segments.canny[1]"),
+            ("[depth]\nnearest_m = 5.0\nfarthest_m = 1.0", "depth.farthest_m"),
             ("seed = ", "configuration"),
         ] {
             let error = Options::from_toml(text).unwrap_err().to_string();

@@ -13,12 +13,12 @@ pub enum Error {
     #[error(transparent)]
     Raw(#[from] rgbd::Error),
     /// A detector refused an image.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {cause}", path.display())]
     Detect {
         /// The image.
         path: PathBuf,
         /// Why.
-        source: detect::Error,
+        cause: detect::Error,
     },
     /// An option cannot be used.
     #[error("{place}: expected {expected}, found {found}")]
@@ -52,11 +52,11 @@ pub enum Error {
     #[error(transparent)]
     Format(#[from] open_structure::format::Error),
     /// A line landmark has no length.
-    #[error("{line_id}: {source}")]
+    #[error("{line_id}: {cause}")]
     Line {
         /// The landmark.
         line_id: LineId,
         /// What is wrong with it.
-        source: open_structure::geometry::Error,
+        cause: open_structure::geometry::Error,
     },
 }

@@ -16,7 +16,7 @@ use super::second_pass::{Seen, SeenLine, find};
 use super::{Error, Ledger, Options, Progress};
 use crate::associate::{Group, LineCandidate, LineMap, LineOptions, PointCandidate, PointMap, group_lines};
 use crate::ordered::ordered;
-use crate::rgbd::{RawFrame, RawSequence};
+use crate::rgbd::{self, RawFrame, RawSequence};
 
 /// Frames that are decoded ahead for each thread.
 const AHEAD: usize = 2;
@@ -90,8 +90,10 @@ pub fn generate(
         },
     )?;
     if usable.is_empty() {
-        let reason =
-            excluded.first().map_or_else(|| "the lists name none".to_owned(), |first| first.reason.clone());
+        let reason = excluded.first().map_or_else(
+            || "the lists name none".to_owned(),
+            |first| format!("{}: {}", first.file, first.reason),
+        );
         return Err(Error::Nothing { what: "frames", frames: raw.frames.len(), reason });
     }
 
@@ -124,8 +126,17 @@ pub fn generate(
 }
 
 fn unusable(frame: &RawFrame, error: &Error) -> Exclusion {
-    let file = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    Exclusion { file: file(&frame.colour), reason: error.to_string(), count: 1, first_line: None }
+    // Without the folder, which tells nothing of the dataset and, of an archive, is another each time.
+    let (path, reason) = match error {
+        Error::Raw(rgbd::Error::Image { path, expected, found }) => {
+            (path, format!("expected {expected}, found {found}"))
+        }
+        Error::Raw(rgbd::Error::Io { path, cause }) => (path, cause.to_string()),
+        Error::Detect { path, cause } => (path, cause.to_string()),
+        other => (&frame.colour, other.to_string()),
+    };
+    let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    Exclusion { file, reason, count: 1, first_line: None }
 }
 
 /// Landmarks, and who sees them, before those are left out that too few frames see.
@@ -165,7 +176,7 @@ impl Found {
         let stay = self.segments.iter().enumerate().filter(|(place, _)| kept(&lines, *place));
         for (line_id, (place, segment)) in (0..).map(LineId).zip(stay) {
             let row = LineLandmark::from_segment(line_id, segment)
-                .map_err(|source| Error::Line { line_id, source })?;
+                .map_err(|cause| Error::Line { line_id, cause })?;
             rows.push(row);
             segments.push(*segment);
             let before = self.lines[place].segment;

@@ -94,15 +94,15 @@ impl Options {
             ("depth.noise.linear", noise.linear, PART),
             ("depth.noise.quadratic_per_m", noise.quadratic_per_m, PART),
             ("points.max_features", points.max_features.into(), [0.0, 1e5]),
-            ("points.scale_factor", points.scale_factor.into(), [1.01, 4.0]),
+            ("points.scale_factor", points.scale_factor.into(), [1.01_f32.into(), 4.0]),
             ("points.levels", points.levels.into(), [1.0, 16.0]),
             ("points.fast_threshold", points.fast_threshold.into(), [1.0, 255.0]),
             ("points.min_distance_px", points.min_distance_px, PX),
             ("segments.piece_px", segments.piece_px, PX),
             ("segments.length_px", segments.length_px, PX),
             ("segments.straightness_px", segments.straightness_px, [0.01, 100.0]),
-            ("segments.canny[0]", segments.canny[0], PX),
-            ("segments.canny[1]", segments.canny[1], PX),
+            ("segments.canny[0]", segments.canny[0], [1e-3, 1e4]),
+            ("segments.canny[1]", segments.canny[1], [1e-3, 1e4]),
             ("segments.merge_angle_deg", segments.merge_angle_deg, [0.0, 90.0]),
             ("segments.merge_distance_px", segments.merge_distance_px, PX),
             ("segments.merge_gap_px", segments.merge_gap_px, [-1e4, 1e4]),
@@ -133,6 +133,9 @@ impl Options {
         ];
         for (place, value, [least, most]) in numbers {
             within(place, value, least, most)?;
+        }
+        if let (Some(nearest_m), Some(farthest_m)) = (depth.nearest_m, depth.farthest_m) {
+            within("depth.farthest_m", farthest_m, nearest_m, 1e6)?;
         }
         within("groups.angle_deg", groups.angle_deg, 0.0, 45.0)?;
         within("groups.shift_m", groups.shift_m, 0.0, 1e3)?;

@@ -5,6 +5,7 @@ use open_structure::geometry::Segment;
 
 use super::{Error, Options};
 use crate::associate::visible_part;
+use crate::interruption::working;
 use crate::rgbd::{Raster, RawFrame, RawSequence, Sight};
 
 /// A line that a frame sees.
@@ -36,6 +37,7 @@ pub(super) fn find(
     points: &[Point3<f64>],
     lines: &[Segment],
 ) -> Result<Seen, Error> {
+    let _working = working();
     let map = raw.depth(frame)?;
     let depths_m = raw.camera.depth_min.unwrap_or(0.0)..=raw.camera.depth_max.unwrap_or(f64::INFINITY);
     let camera_from_world = frame.world_from_camera.inverse();

@@ -7,12 +7,12 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// A file could not be read.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {cause}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
         /// Why.
-        source: io::Error,
+        cause: io::Error,
     },
     /// A folder is not of the dataset.
     #[error("{}: expected {expected}, found {found}", path.display())]
@@ -50,8 +50,8 @@ pub enum Error {
 
 impl Error {
     /// A file that could not be read.
-    pub fn io(path: impl Into<PathBuf>, source: io::Error) -> Self {
-        Self::Io { path: path.into(), source }
+    pub fn io(path: impl Into<PathBuf>, cause: io::Error) -> Self {
+        Self::Io { path: path.into(), cause }
     }
 
     /// A folder, or a file as a whole, that is not of the dataset.

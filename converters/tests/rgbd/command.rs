@@ -1,20 +1,16 @@
 //! The commands that make sequences of RGB-D images: what they say, refuse and leave behind.
-#![cfg(unix)]
-#![expect(clippy::unwrap_used, reason = "tests")]
-
-mod wall;
 
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use crate::wall::{FRAMES, SIZE, Wall, names, write_png};
 use open_structure::format;
 use open_structure::structure::Sequence;
 use open_structure::validate::{self, Severity, validate};
 use open_structure_converters::generate::Options;
 use serde_json::Value;
-use wall::{FRAMES, SIZE, Wall, names, write_png};
 
 /// Runs `os-convert` in a folder and gives exit code, stdout and stderr, but for what the PNG library itself writes there.
 fn os_convert(folder: &Path, arguments: &[&str]) -> (i32, String, String) {

@@ -60,7 +60,7 @@ impl Default for LineOptions {
     fn default() -> Self {
         Self {
             step_px: 1.0,
-            most_places: 48,
+            most_places: 32,
             depth_part: 0.6,
             rims: Rims::Nearer,
             rim_part: 0.5,
@@ -76,7 +76,7 @@ impl Default for LineOptions {
             min_detections: 3,
             min_observations: 5,
             nearest_m: 0.05,
-            sight_step_px: 2.0,
+            sight_step_px: 3.0,
             sight_gap_px: 8.0,
             sight_length_px: 15.0,
             sight_part: 0.7,

@@ -7,7 +7,7 @@ const PASSES: usize = 2;
 /// Half width of the window across the edge, pixels.
 const REACH: i32 = 2;
 /// Most places along a segment at which its edge is looked at.
-const PLACES: f64 = 40.0;
+const PLACES: f64 = 20.0;
 /// A segment is moved by no more than this at an end, pixels: what is farther is another edge.
 const FARTHEST_PX: f64 = 1.5;
 

@@ -12,7 +12,7 @@ use open_structure::structure::{
 
 use super::describe::manifest;
 use super::first_pass::look;
-use super::second_pass::{Seen, SeenLine, find};
+use super::second_pass::{Landmarks, Seen, SeenLine, find};
 use super::{Error, Ledger, Options, Progress};
 use crate::associate::{Group, LineCandidate, LineMap, LineOptions, PointCandidate, PointMap, group_lines};
 use crate::ordered::ordered;
@@ -20,6 +20,9 @@ use crate::rgbd::{self, RawFrame, RawSequence};
 
 /// Frames that are decoded ahead for each thread.
 const AHEAD: usize = 2;
+/// Most bytes of depth maps that are kept from the first pass to the second: those of the first frames, so that a short sequence
+/// reads each once.
+const KEPT_BYTES: usize = 96 << 20;
 /// Rows of frames that are made at once while writing.
 const CHUNK: usize = 64;
 
@@ -68,6 +71,7 @@ pub fn generate(
     let fuse_distance_m = options.lines.fuse_distance_m + raw.pose_sigma_m;
     let mut lines = LineMap::new(&LineOptions { fuse_distance_m, ..options.lines.clone() });
     let mut usable: Vec<&RawFrame> = Vec::with_capacity(raw.frames.len());
+    let (mut kept, mut kept_bytes) = (Vec::new(), 0);
     ordered(
         raw.frames.len(),
         threads,
@@ -80,6 +84,10 @@ pub fn generate(
                     ledger.add(&shown.ledger);
                     points.add_frame(frame, &shown.points);
                     lines.add(frame, &shown.lines);
+                    kept_bytes += shown.depth.bytes();
+                    if kept_bytes <= KEPT_BYTES {
+                        kept.push(shown.depth);
+                    }
                     usable.push(&raw.frames[index]);
                 }
                 Err(error) if keep_going => excluded.push(unusable(&raw.frames[index], &error)),
@@ -108,13 +116,14 @@ pub fn generate(
     let groups = group_lines(&mut segments, &options.groups);
 
     let positions: Vec<Point3<f64>> = points.iter().map(|point| point.position).collect();
+    let landmarks = Landmarks { points: &positions, lines: &segments };
     let mut seen: Vec<Seen> = Vec::with_capacity(usable.len());
     let total = usable.len() as u64;
     ordered(
         usable.len(),
         threads,
         AHEAD * threads,
-        |index| find(raw, &raster, options, usable[index], &positions, &segments),
+        |index| find(raw, &raster, options, usable[index], kept.get(index), landmarks),
         |index, found| {
             seen.push(found?);
             progress("finding", index as u64 + 1, total);

@@ -6,7 +6,7 @@ use open_structure::geometry::Segment;
 use super::{Error, Options};
 use crate::associate::visible_part;
 use crate::interruption::working;
-use crate::rgbd::{Raster, RawFrame, RawSequence, Sight};
+use crate::rgbd::{DepthMap, Raster, RawFrame, RawSequence, Sight};
 
 /// A line that a frame sees.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,7 +25,16 @@ pub(super) struct Seen {
     pub(super) absent_points: Vec<u32>,
 }
 
+/// What a frame is asked for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Landmarks<'a> {
+    pub(super) points: &'a [Point3<f64>],
+    pub(super) lines: &'a [Segment],
+}
+
 /// Holds every landmark against the depth map of a frame.
+///
+/// * `kept` — the depth map, where it is still there from the first pass.
 ///
 /// # Source
 /// Open-Structure (Li et al. 2024), section III-A: all observations of each landmark. The test against the depth map is ours.
@@ -34,11 +43,18 @@ pub(super) fn find(
     raster: &Raster,
     options: &Options,
     frame: &RawFrame,
-    points: &[Point3<f64>],
-    lines: &[Segment],
+    kept: Option<&DepthMap>,
+    landmarks: Landmarks<'_>,
 ) -> Result<Seen, Error> {
     let _working = working();
-    let map = raw.depth(frame)?;
+    let read;
+    let map = if let Some(kept) = kept {
+        kept
+    } else {
+        read = raw.depth(frame)?;
+        &read
+    };
+    let Landmarks { points, lines } = landmarks;
     let depths_m = raw.camera.depth_min.unwrap_or(0.0)..=raw.camera.depth_max.unwrap_or(f64::INFINITY);
     let camera_from_world = frame.world_from_camera.inverse();
     let focal_px = raster.camera().fx.abs();
@@ -58,7 +74,7 @@ pub(super) fn find(
         }
     }
     for (place, line) in (0..).zip(lines) {
-        let part = visible_part(raster, &map, &noise, &camera_from_world, line, &options.lines);
+        let part = visible_part(raster, map, &noise, &camera_from_world, line, &options.lines);
         seen.lines.extend(part.map(|part| SeenLine { line: place, part }));
     }
     Ok(seen)

@@ -79,6 +79,14 @@ pub enum Error {
         /// What it looks like.
         found: String,
     },
+    /// The folder to be replaced has the mirror in it.
+    #[error("{}: expected a folder without the mirror, found {} in it", path.display(), mirror.display())]
+    ReplacesMirror {
+        /// The folder that would be replaced.
+        path: PathBuf,
+        /// The mirror.
+        mirror: PathBuf,
+    },
     /// A mirror on disk does not have the file.
     #[error("{file}: expected {} or {}, found neither", first.display(), second.display())]
     NotOnMirror {

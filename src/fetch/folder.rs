@@ -114,6 +114,12 @@ pub fn fetch(
     if !options.force && into.symlink_metadata().is_ok() {
         return Err(Error::Exists { path: into });
     }
+    if let Some(Mirror::Folder(mirror)) = &options.mirror
+        && let (Ok(mirror), Ok(target)) = (mirror.canonicalize(), into.canonicalize())
+        && mirror.starts_with(&target)
+    {
+        return Err(Error::ReplacesMirror { path: into, mirror });
+    }
     let downloads =
         Downloads { folder: download_folder(&into), client: Client::new(&options.patience), options };
     let mut files = Vec::new();
@@ -126,7 +132,14 @@ pub fn fetch(
     unfinished.create_folder().map_err(Error::io(&temporary))?;
     let mut fetched = Vec::new();
     for (file, (place, stored)) in part.files.iter().zip(&files) {
-        let (unpacked, left_out) = put(file, stored, &temporary, options, events)?;
+        let put = put(file, stored, &temporary, options, events);
+        let (unpacked, left_out) = put.inspect_err(|error| {
+            // Where no digest tells a whole download from a broken one, the next run has to fetch it again.
+            let damaged = matches!(error, Error::Archive(archive::Error::Damaged { .. }));
+            if damaged && file.sha256.is_none() && stored.path.starts_with(&downloads.folder) {
+                let _ = fs::remove_file(&stored.path);
+            }
+        })?;
         fetched.push(FetchedFile {
             name: file.file_name().to_owned(),
             place: place.clone(),

@@ -5,11 +5,12 @@ use super::parse::{assignment, frame_range, given_camera, sequence_name};
 use super::stages::Stages;
 use super::unpacked::Input;
 use crate::detect::Detector;
+use crate::family::FAMILIES;
 use crate::generate::{self, Generated, Options};
 use crate::rgbd::{self, GivenCamera, Kinect, OpenOptions, RawSequence};
 use anyhow::Context as _;
 use clap::builder::PossibleValuesParser;
-use open_structure::datasets::{self, Recipe};
+use open_structure::datasets::{self, CameraOfDataset, Recipe};
 use open_structure::format::{self, Encoding, WriteOptions};
 use open_structure::simulate::noise::{NoiseModel, NoiseRecipe};
 use serde::Serialize;
@@ -131,7 +132,7 @@ Examples:
 Missing files that lists name are counted and passed over; a file that is there and cannot be used is an error, unless
 --keep-going leaves its frame out.
 
-Exit codes: 0 done; 1 failed; 2 misused; 3 done, and frames were left out.";
+Exit codes: 0 done; 1 failed; 2 misused; 3 done, and --keep-going left something out.";
 
 fn seconds(text: &str) -> Result<f64, String> {
     let value: f64 = text.parse().map_err(|_| "expected a number of seconds".to_owned())?;
@@ -180,6 +181,12 @@ impl Args {
             "fr3" => Some(Kinect::Fr3),
             _ => None,
         });
+        // One that the converters know has its own numbers, and its distortion.
+        let unknown = |recipe: &&Recipe| FAMILIES.iter().all(|family| family.name != recipe.camera.family);
+        let camera = recipe.filter(unknown).map(|recipe| {
+            let CameraOfDataset { fx, fy, cx, cy, width, height, .. } = recipe.camera;
+            GivenCamera { fx, fy, cx, cy, size: Some([width, height]) }
+        });
         #[expect(clippy::cast_possible_truncation, reason = "at most ten seconds")]
         let nanos = (self.max_difference * 1e9).round() as i64;
         OpenOptions {
@@ -187,7 +194,7 @@ impl Args {
             stride: self.stride,
             keep_going: self.keep_going,
             max_stamp_difference_nanos: nanos,
-            camera: self.camera,
+            camera: self.camera.or(camera),
             kinect,
             ..OpenOptions::default()
         }
@@ -266,7 +273,22 @@ pub fn run(
         Dataset::Tum => rgbd::tum::open(unpacked.folder(), &open_options),
         Dataset::Icl => rgbd::icl::open(unpacked.folder(), &open_options),
         Dataset::TartanAir => rgbd::tartanair::open(unpacked.folder(), &open_options),
-    }?;
+    }
+    .map_err(anyhow::Error::from)
+    .or_else(|error| match &unpacked {
+        Input::Folder(_) => Err(error),
+        // What is unpacked goes again, so the archive is what people know.
+        Input::Archive(_) => Err(error).with_context(|| input.display().to_string()),
+    })?;
+    if let Some(recipe) =
+        recipe.as_ref().filter(|recipe| recipe.camera.pixel_origin != raw.camera.pixel_origin)
+    {
+        let (expected, found) = (&raw.camera.pixel_origin, &recipe.camera.pixel_origin);
+        anyhow::bail!(
+            "recipe {}: camera.pixel_origin: expected {expected}, the dataset's, found {found}",
+            recipe.name
+        );
+    }
     if let Some(recipe) = recipe {
         raw.name = recipe.name;
         raw.description = recipe.description;
@@ -352,6 +374,8 @@ struct Report {
     line_observations: u64,
     became: generate::Ledger,
     excluded: Vec<open_structure::structure::Exclusion>,
+    /// Whether some of that was there and could not be used, frames or lines.
+    unusable: bool,
     noise: Option<open_structure::structure::Noise>,
 }
 
@@ -384,12 +408,14 @@ impl Report {
             line_observations,
             became: generated.ledger().clone(),
             excluded: manifest.excluded.clone(),
+            unusable: manifest.excluded.len() > raw.excluded.len()
+                || raw.excluded.iter().any(|excluded| excluded.first_line.is_some()),
             noise: manifest.noise.clone(),
         }
     }
 
     fn frames_left_out(&self) -> bool {
-        !self.excluded.is_empty()
+        self.unusable
     }
 
     fn render(&self, stdout: &mut dyn Write) -> anyhow::Result<()> {

@@ -97,7 +97,9 @@ impl PointDetector {
         for (row, keypoint) in (0..).zip(&keypoints) {
             let mut descriptor = [0; DESCRIPTOR_BYTES];
             descriptor.copy_from_slice(descriptors.at_row::<u8>(row)?);
-            let scale = f64::from(self.options.scale_factor).powi(keypoint.octave());
+            // By products: powers need not be the same on every machine.
+            let scale =
+                (0..keypoint.octave()).fold(1.0, |scale, _| scale * f64::from(self.options.scale_factor));
             let position = keypoint.pt();
             let middle = |value: f32, size: i32| {
                 let size = f64::from(size);
@@ -196,7 +198,7 @@ mod tests {
         let mut detector = PointDetector::new(options).unwrap();
         let (points, others) = (detector.detect(&grey).unwrap(), detector.detect(&turned).unwrap());
         for level in [1, 4, 7] {
-            let scale = f64::from(options.scale_factor).powi(level);
+            let scale = (0..level).fold(1.0, |scale, _| scale * f64::from(options.scale_factor));
             let on_level = |point: &&DetectedPoint| point.scale == scale;
             let back = |point: &Point2<f64>| Point2::new(639.0 - point.x, 479.0 - point.y);
             let (mut sum, mut count) = (nalgebra::Vector2::zeros(), 0.0);

@@ -116,13 +116,19 @@ fn wrong(path: &Path, number: u64, text: &str, expected: impl ToString) -> Error
 /// [`Error::Io`].
 pub(super) fn bytes(path: &Path, most: u64) -> Result<Option<Vec<u8>>, Error> {
     let failed = |source| Error::io(path, source);
+    // Before it is opened: a pipe waits for someone to write.
+    let found = path.metadata().map_err(failed)?;
+    if !found.is_file() {
+        let other = std::io::Error::other("expected a file, found a folder, a pipe or a device");
+        return Err(failed(other));
+    }
     let file = File::open(path).map_err(failed)?;
-    let length = file.metadata().map_err(failed)?.len();
+    let length = found.len();
     if length > most {
         return Ok(None);
     }
     let mut bytes = Vec::with_capacity(usize::try_from(length).unwrap_or(0) + 1);
-    // A pipe or a growing file has no length that could be relied on.
+    // A growing file has no length that could be relied on.
     file.take(most + 1).read_to_end(&mut bytes).map_err(failed)?;
     Ok((bytes.len() as u64 <= most).then_some(bytes))
 }

@@ -44,7 +44,11 @@ pub(super) fn bytes(path: &Path, [width, height]: [u32; 2]) -> Result<Vec<u8>, E
 pub(super) fn grey(path: &Path, size: [u32; 2]) -> Result<Mat, Error> {
     let bytes = bytes(path, size)?;
     let found = if bytes.starts_with(PNG) {
-        png_header(&bytes).map(|(size, _)| size)
+        let header = png_header(&bytes);
+        if header.is_some_and(|(_, kind)| kind.bits == 16) {
+            return Err(Error::image(path, "a picture of at most 8 bits", "one of 16, as depth maps are"));
+        }
+        header.map(|(size, _)| size)
     } else if bytes.starts_with(&[0xFF, 0xD8]) {
         // A file that was cut off would be decoded to its end and grey from there.
         jpeg_size(&bytes).filter(|_| bytes.windows(2).rev().any(|pair| pair == [0xFF, 0xD9]))

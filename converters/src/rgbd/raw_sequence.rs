@@ -102,9 +102,10 @@ pub(super) fn no_frame(root: &Path, excluded: &[Exclusion]) -> Error {
     let found = if excluded.is_empty() {
         "none of those that are wanted".to_owned()
     } else {
+        // Frames may also be there, and not be wanted.
         let reasons =
             excluded.iter().map(|found| format!("{}: {} {}", found.file, found.count, found.reason));
-        reasons.collect::<Vec<_>>().join("; ")
+        format!("none of those that are wanted; {}", reasons.collect::<Vec<_>>().join("; "))
     };
     Error::layout(root, "at least one frame with its images and a true pose", found)
 }

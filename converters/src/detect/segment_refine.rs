@@ -60,6 +60,10 @@ pub(super) fn refine(grey: &Grey<'_>, segment: [Point2<f64>; 2]) -> Option<[Poin
             return Some(segment);
         }
         current = moved;
+        // The window was over the middle already.
+        if at_start.abs().max(at_end.abs()) < 0.25 {
+            break;
+        }
     }
     Some(current)
 }

@@ -6,7 +6,7 @@ use super::{Error, Ledger, Options};
 use crate::associate::{LiftedLine, LiftedPoint, PointRejection, lift, lift_point};
 use crate::detect::{PointDetector, segments};
 use crate::interruption::working;
-use crate::rgbd::{DepthMap, Raster, RawFrame, RawSequence};
+use crate::rgbd::{Raster, RawFrame, RawSequence};
 
 /// What one frame shows, in the world.
 #[derive(Debug)]
@@ -14,8 +14,6 @@ pub(super) struct Shown {
     pub(super) points: Vec<LiftedPoint>,
     pub(super) lines: Vec<LiftedLine>,
     pub(super) ledger: Ledger,
-    /// The depth map, for the second pass.
-    pub(super) depth: DepthMap,
 }
 
 /// Detects points and segments of a frame and lifts them.
@@ -72,5 +70,5 @@ pub(super) fn look(
         }
     }
     ledger.segments_lifted = lines.len() as u64;
-    Ok(Shown { points, lines, ledger, depth: images.depth })
+    Ok(Shown { points, lines, ledger })
 }

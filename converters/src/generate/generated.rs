@@ -20,11 +20,8 @@ use crate::rgbd::{self, RawFrame, RawSequence};
 
 /// Frames that are decoded ahead for each thread.
 const AHEAD: usize = 2;
-/// Most bytes of depth maps that are kept from the first pass to the second: those of the first frames, so that a short sequence
-/// reads each once.
-const KEPT_BYTES: usize = 96 << 20;
 /// Rows of frames that are made at once while writing.
-const CHUNK: usize = 64;
+const CHUNK: usize = 8;
 
 /// A sequence made of images: landmarks, groups, and what each frame sees of them.
 ///
@@ -71,7 +68,6 @@ pub fn generate(
     let fuse_distance_m = options.lines.fuse_distance_m + raw.pose_sigma_m;
     let mut lines = LineMap::new(&LineOptions { fuse_distance_m, ..options.lines.clone() });
     let mut usable: Vec<&RawFrame> = Vec::with_capacity(raw.frames.len());
-    let (mut kept, mut kept_bytes) = (Vec::new(), 0);
     ordered(
         raw.frames.len(),
         threads,
@@ -84,10 +80,6 @@ pub fn generate(
                     ledger.add(&shown.ledger);
                     points.add_frame(frame, &shown.points);
                     lines.add(frame, &shown.lines);
-                    kept_bytes += shown.depth.bytes();
-                    if kept_bytes <= KEPT_BYTES {
-                        kept.push(shown.depth);
-                    }
                     usable.push(&raw.frames[index]);
                 }
                 Err(error) if keep_going => excluded.push(unusable(&raw.frames[index], &error)),
@@ -123,7 +115,7 @@ pub fn generate(
         usable.len(),
         threads,
         AHEAD * threads,
-        |index| find(raw, &raster, options, usable[index], kept.get(index), landmarks),
+        |index| find(raw, &raster, options, usable[index], landmarks),
         |index, found| {
             seen.push(found?);
             progress("finding", index as u64 + 1, total);

@@ -6,7 +6,7 @@ use open_structure::geometry::Segment;
 use super::{Error, Options};
 use crate::associate::visible_part;
 use crate::interruption::working;
-use crate::rgbd::{DepthMap, Raster, RawFrame, RawSequence, Sight};
+use crate::rgbd::{Raster, RawFrame, RawSequence, Sight};
 
 /// A line that a frame sees.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,8 +34,6 @@ pub(super) struct Landmarks<'a> {
 
 /// Holds every landmark against the depth map of a frame.
 ///
-/// * `kept` — the depth map, where it is still there from the first pass.
-///
 /// # Source
 /// Open-Structure (Li et al. 2024), section III-A: all observations of each landmark. The test against the depth map is ours.
 pub(super) fn find(
@@ -43,17 +41,10 @@ pub(super) fn find(
     raster: &Raster,
     options: &Options,
     frame: &RawFrame,
-    kept: Option<&DepthMap>,
     landmarks: Landmarks<'_>,
 ) -> Result<Seen, Error> {
     let _working = working();
-    let read;
-    let map = if let Some(kept) = kept {
-        kept
-    } else {
-        read = raw.depth(frame)?;
-        &read
-    };
+    let map = raw.depth(frame)?;
     let Landmarks { points, lines } = landmarks;
     let depths_m = raw.camera.depth_min.unwrap_or(0.0)..=raw.camera.depth_max.unwrap_or(f64::INFINITY);
     let camera_from_world = frame.world_from_camera.inverse();
@@ -74,7 +65,7 @@ pub(super) fn find(
         }
     }
     for (place, line) in (0..).zip(lines) {
-        let part = visible_part(raster, map, &noise, &camera_from_world, line, &options.lines);
+        let part = visible_part(raster, &map, &noise, &camera_from_world, line, &options.lines);
         seen.lines.extend(part.map(|part| SeenLine { line: place, part }));
     }
     Ok(seen)

@@ -110,15 +110,6 @@ impl DepthMap {
         Some(Self { width, height, samples, range_m: [f32::from_bits(1), f32::MAX] })
     }
 
-    /// Memory that it takes, bytes.
-    #[must_use]
-    pub fn bytes(&self) -> usize {
-        match &self.samples {
-            Samples::Metres(depths) => 4 * depths.capacity(),
-            Samples::LittleEndian { bytes, .. } => bytes.capacity(),
-        }
-    }
-
     /// Columns and rows.
     #[must_use]
     pub fn size(&self) -> [usize; 2] {

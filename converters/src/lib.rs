@@ -6,7 +6,6 @@ pub mod command;
 pub mod detect;
 pub mod family;
 pub mod generate;
-pub mod interruption;
 pub mod ordered;
 pub mod release;
 pub mod rgbd;

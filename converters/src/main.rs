@@ -3,7 +3,6 @@
 use clap::Parser;
 use open_structure_converters::command::rgbd::{self, Dataset};
 use open_structure_converters::command::{Outcome, text_release};
-use open_structure_converters::interruption;
 use std::io::{self, Write as _};
 use std::process::ExitCode;
 
@@ -38,9 +37,9 @@ fn main() -> ExitCode {
     let cli = Cli::parse();
     // Without a handler an interrupted program merely leaves a temporary file behind.
     let _ = ctrlc::set_handler(|| {
-        let _rest = interruption::rest();
         open_structure::format::discard_unfinished();
-        std::process::exit(130);
+        // At once: the destructors of OpenCV's libraries would take away what other threads work with.
+        signal_hook::low_level::exit(130);
     });
     let mut stdout = io::stdout().lock();
     let mut stderr = io::stderr();

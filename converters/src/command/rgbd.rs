@@ -322,7 +322,8 @@ pub fn run(
     } else {
         report.render(stdout)?;
     }
-    Ok(if report.frames_left_out() { Outcome::Findings } else { Outcome::Done })
+    let left_out = args.keep_going && !report.excluded.is_empty();
+    Ok(if left_out { Outcome::Findings } else { Outcome::Done })
 }
 
 /// What of the input an output would take the place of, if any.
@@ -374,8 +375,6 @@ struct Report {
     line_observations: u64,
     became: generate::Ledger,
     excluded: Vec<open_structure::structure::Exclusion>,
-    /// Whether some of that was there and could not be used, frames or lines.
-    unusable: bool,
     noise: Option<open_structure::structure::Noise>,
 }
 
@@ -408,14 +407,8 @@ impl Report {
             line_observations,
             became: generated.ledger().clone(),
             excluded: manifest.excluded.clone(),
-            unusable: manifest.excluded.len() > raw.excluded.len()
-                || raw.excluded.iter().any(|excluded| excluded.first_line.is_some()),
             noise: manifest.noise.clone(),
         }
-    }
-
-    fn frames_left_out(&self) -> bool {
-        self.unusable
     }
 
     fn render(&self, stdout: &mut dyn Write) -> anyhow::Result<()> {

@@ -5,7 +5,6 @@ use open_structure::simulate::Random;
 use super::{Error, Ledger, Options};
 use crate::associate::{LiftedLine, LiftedPoint, PointRejection, lift, lift_point};
 use crate::detect::{PointDetector, segments};
-use crate::interruption::working;
 use crate::rgbd::{Raster, RawFrame, RawSequence};
 
 /// What one frame shows, in the world.
@@ -25,7 +24,6 @@ pub(super) fn look(
     options: &Options,
     frame: &RawFrame,
 ) -> Result<Shown, Error> {
-    let _working = working();
     let images = raw.images(frame)?;
     let refused = |cause| Error::Detect { path: frame.colour.clone(), cause };
     let mut ledger = Ledger { frames: 1, ..Ledger::default() };

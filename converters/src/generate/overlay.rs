@@ -8,7 +8,6 @@ use opencv::{imgcodecs, imgproc};
 
 use super::{Error, Generated, Options};
 use crate::detect::{self, PointDetector, segments};
-use crate::interruption::working;
 use crate::rgbd::{RawFrame, RawSequence};
 
 /// Positions are drawn to a sixteenth of a pixel.
@@ -45,7 +44,6 @@ pub fn overlay(
     let Some(bundle) = generated.frame(index) else { return Ok(()) };
     let same = |frame: &&RawFrame| frame.frame_id == bundle.frame.frame_id;
     let Some(frame) = raw.frames.iter().find(same) else { return Ok(()) };
-    let _working = working();
     let grey = raw.grey(frame)?;
     let refused = |cause| Error::Detect { path: frame.colour.clone(), cause };
     let unwritten = |detail: String| Error::Picture { path: path.to_owned(), detail };

@@ -5,7 +5,6 @@ use open_structure::geometry::Segment;
 
 use super::{Error, Options};
 use crate::associate::visible_part;
-use crate::interruption::working;
 use crate::rgbd::{Raster, RawFrame, RawSequence, Sight};
 
 /// A line that a frame sees.
@@ -43,7 +42,6 @@ pub(super) fn find(
     frame: &RawFrame,
     landmarks: Landmarks<'_>,
 ) -> Result<Seen, Error> {
-    let _working = working();
     let map = raw.depth(frame)?;
     let Landmarks { points, lines } = landmarks;
     let depths_m = raw.camera.depth_min.unwrap_or(0.0)..=raw.camera.depth_max.unwrap_or(f64::INFINITY);

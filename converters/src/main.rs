@@ -1,8 +1,8 @@
 //! The program `os-convert`: raw datasets to sequences.
 
 use clap::Parser;
-use open_structure_converters::command::rgbd::{self, Dataset};
-use open_structure_converters::command::{Outcome, text_release};
+use open_structure::datasets::Dataset;
+use open_structure_converters::command::{Outcome, rgbd, text_release};
 use std::io::{self, Write as _};
 use std::process::ExitCode;
 
@@ -47,7 +47,7 @@ fn main() -> ExitCode {
         Command::OpenStructure(args) => text_release::run(args, &mut stdout, &mut stderr),
         Command::Tum(args) => rgbd::run(Dataset::Tum, args, &mut stdout, &mut stderr),
         Command::Icl(args) => rgbd::run(Dataset::Icl, args, &mut stdout, &mut stderr),
-        Command::TartanAir(args) => rgbd::run(Dataset::TartanAir, args, &mut stdout, &mut stderr),
+        Command::TartanAir(args) => rgbd::run(Dataset::Tartanair, args, &mut stdout, &mut stderr),
     };
     let result = result.and_then(|outcome| Ok(stdout.flush().map(|()| outcome)?));
     let outcome = result.unwrap_or_else(|error| {

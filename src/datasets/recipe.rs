@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::convert_options::{self, ConvertOptions};
 use super::remote_file::check_url;
 use super::{CameraOfDataset, Error, Part};
+use crate::structure::registry;
 
 /// Largest recipe that is read, bytes.
 pub const MAX_RECIPE_BYTES: u64 = 1 << 20;
@@ -38,9 +39,9 @@ impl Dataset {
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
-            Self::Tum => "tum-rgbd",
-            Self::Icl => "icl-nuim",
-            Self::Tartanair => "tartanair",
+            Self::Tum => registry::TUM_RGBD,
+            Self::Icl => registry::ICL_NUIM,
+            Self::Tartanair => registry::TARTANAIR,
         }
     }
 }

@@ -160,10 +160,9 @@ impl PointMap {
             }
             fused[place as usize] = true;
             fused[other as usize] = true;
-            // The later one stays as an empty place, which no frame detected.
-            let mut absorbed = self.landmarks[other as usize].clone();
-            self.landmarks[other as usize].frames.clear();
-            self.landmarks[place as usize].absorb(&mut absorbed);
+            if let Ok([kept, absorbed]) = self.landmarks.get_disjoint_mut([place as usize, other as usize]) {
+                kept.absorb(absorbed);
+            }
         }
     }
 }
@@ -210,7 +209,7 @@ impl Fused {
         self.settle();
     }
 
-    /// Takes another landmark in.
+    /// Takes another landmark in, which stays as an empty place that no frame detected.
     fn absorb(&mut self, other: &mut Self) {
         self.information += other.information;
         self.weighted += other.weighted + other.information * (other.origin - self.origin);

@@ -10,7 +10,7 @@ use crate::generate::{self, Generated, Options};
 use crate::rgbd::{self, GivenCamera, Kinect, OpenOptions, RawSequence};
 use anyhow::Context as _;
 use clap::builder::PossibleValuesParser;
-use open_structure::datasets::{self, CameraOfDataset, Recipe};
+use open_structure::datasets::{self, CameraOfDataset, Dataset, Recipe};
 use open_structure::format::{self, Encoding, WriteOptions};
 use open_structure::simulate::noise::{NoiseModel, NoiseRecipe};
 use serde::Serialize;
@@ -21,28 +21,6 @@ use std::path::{Path, PathBuf};
 
 /// Largest configuration that is read, bytes.
 const MAX_CONFIG_BYTES: u64 = 1 << 20;
-
-/// A dataset of RGB-D images.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Dataset {
-    /// TUM RGB-D.
-    Tum,
-    /// ICL-NUIM.
-    Icl,
-    /// TartanAir.
-    TartanAir,
-}
-
-impl Dataset {
-    /// The command of the dataset.
-    const fn command(self) -> &'static str {
-        match self {
-            Self::Tum => "tum",
-            Self::Icl => "icl",
-            Self::TartanAir => "tartanair",
-        }
-    }
-}
 
 /// What the three commands share.
 #[derive(Debug, clap::Args)]
@@ -239,7 +217,7 @@ pub fn run(
         writeln!(stderr, "error: --kinect is for TUM RGB-D")?;
         return Ok(Outcome::Misused);
     }
-    if let Some(recipe) = recipe.as_ref().filter(|recipe| recipe.dataset.command() != dataset.command()) {
+    if let Some(recipe) = recipe.as_ref().filter(|recipe| recipe.dataset != dataset) {
         writeln!(
             stderr,
             "error: {} is of another dataset: os-convert {}",
@@ -272,7 +250,7 @@ pub fn run(
     let mut raw = match dataset {
         Dataset::Tum => rgbd::tum::open(unpacked.folder(), &open_options),
         Dataset::Icl => rgbd::icl::open(unpacked.folder(), &open_options),
-        Dataset::TartanAir => rgbd::tartanair::open(unpacked.folder(), &open_options),
+        Dataset::Tartanair => rgbd::tartanair::open(unpacked.folder(), &open_options),
     }
     .map_err(anyhow::Error::from)
     .or_else(|error| match &unpacked {

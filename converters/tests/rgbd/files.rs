@@ -70,6 +70,8 @@ fn an_error_is_told_once() {
 #[test]
 fn an_interrupted_conversion_ends_at_once_without_a_crash() {
     let wall = Wall::new();
+    // Long enough that every interruption comes before the end.
+    wall.repeat(50);
     let mut interrupted = 0;
     for wait in (0..12).map(|step| 40 + 20 * step) {
         let mut child = Command::new(cargo_bin("os-convert"))

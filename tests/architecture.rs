@@ -23,6 +23,23 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("statistics", &["geometry", "structure"]),
     ("plot", &["geometry", "structure"]),
     ("evaluate", &["geometry", "structure"]),
+    ("covisibility", &["geometry", "structure"]),
+    ("exchange", &["geometry", "structure"]),
+    (
+        "benchmark",
+        &[
+            "geometry",
+            "structure",
+            "format",
+            "simulate",
+            "datasets",
+            "track",
+            "covisibility",
+            "adjust",
+            "evaluate",
+            "plot",
+        ],
+    ),
     ("validate", &["geometry", "structure", "format", "simulate", "track", "adjust", "evaluate"]),
     (
         "cli",
@@ -36,8 +53,11 @@ const ROOMS: &[(&str, &[&str])] = &[
             "datasets",
             "fetch",
             "track",
+            "covisibility",
             "adjust",
             "evaluate",
+            "exchange",
+            "benchmark",
             "validate",
         ],
     ),
@@ -194,7 +214,9 @@ fn converters_meet_the_tools_in_files_alone() {
                 if room == "simulate" && drawn {
                     continue;
                 }
-                if ["simulate", "track", "adjust", "evaluate", "cli"].contains(&room) {
+                if ["simulate", "track", "adjust", "evaluate", "covisibility", "benchmark", "cli"]
+                    .contains(&room)
+                {
                     wrong.push(format!("{path}:{number}: names open_structure::{room}"));
                 }
             }

@@ -22,6 +22,9 @@ record! {
         /// Estimated position, z.
         ["m", "world"]
         z: f64,
+        /// Upper triangle, row by row, of the covariance of x, y, z: 6 numbers; absent where it is not known.
+        ["m²", "world", "1.3.0"]
+        covariance: Option<Vec<f64>>,
     }
 }
 
@@ -52,6 +55,9 @@ record! {
         /// Second end, z.
         ["m", "world"]
         end_z: f64,
+        /// Upper triangle, row by row, of the covariance of start and end: 21 numbers, of a matrix that is zero along the line; absent where it is not known.
+        ["m²", "world", "1.3.0"]
+        covariance: Option<Vec<f64>>,
     }
 }
 

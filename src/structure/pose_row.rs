@@ -46,7 +46,7 @@ impl From<&Pose> for PoseRow {
 
 /// Gives a row whose seven pose columns are always present a constructor and an accessor.
 macro_rules! stored_pose {
-    ($name:ident { $($field:ident: $type:ty),+ }) => {
+    ($name:ident { $($field:ident: $type:ty),+ } $(absent: $absent:ident)?) => {
         impl $name {
             /// A row with its pose.
             #[must_use]
@@ -61,6 +61,7 @@ macro_rules! stored_pose {
                     world_from_camera_qy: qy,
                     world_from_camera_qz: qz,
                     world_from_camera_qw: qw,
+                    $($absent: None,)?
                 }
             }
 

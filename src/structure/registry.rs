@@ -1,7 +1,7 @@
 //! Well-known values: the registry of the specification in code.
 
 /// Version of the specification that this crate writes.
-pub const SPEC_VERSION: &str = "1.2.0";
+pub const SPEC_VERSION: &str = "1.3.0";
 
 /// Camera model: perspective projection without distortion.
 pub const PINHOLE: &str = "pinhole";
@@ -49,6 +49,20 @@ pub const POINT_BA: &str = "point-ba";
 pub const POINT_LINE_BA: &str = "point-line-ba";
 /// Estimate: the lines of a sequence before they were made parallel.
 pub const UNREFINED: &str = "unrefined";
+
+/// Estimate: bundle adjustment with depth, parallel groups and the declared noise.
+pub const STRUCTURAL_BA: &str = "structural-ba";
+/// Estimate: adjustment of relative poses alone.
+pub const POSE_GRAPH: &str = "pose-graph";
+
+/// Tracking: the pose was given and not estimated.
+pub const GAUGE: &str = "gauge";
+/// Tracking: the pose follows from the measurements.
+pub const TRACKED: &str = "tracked";
+/// Tracking: too little was measured; the pose continues the motion before.
+pub const PREDICTED: &str = "predicted";
+/// Tracking: too little was measured, and there was no motion to continue.
+pub const LOST: &str = "lost";
 
 /// Dataset: the first text release of the paper's data.
 pub const OPEN_STRUCTURE_TEXT: &str = "open-structure-text";
@@ -188,7 +202,26 @@ pub const FAMILIES: &[Family] = &[
             (MAP_TO_FRAME, "tracking against a local map"),
             (POINT_BA, "bundle adjustment of points"),
             (POINT_LINE_BA, "bundle adjustment of points and lines"),
+            (
+                STRUCTURAL_BA,
+                "bundle adjustment with depth, the declared noise, and lines that share the directions of their groups",
+            ),
+            (POSE_GRAPH, "adjustment of relative poses alone"),
             (UNREFINED, "lines as observed, before they were made parallel; recovered"),
+        ],
+    },
+    Family {
+        name: "tracking state",
+        place: "`tracking.state`",
+        open: true,
+        values: &[
+            (GAUGE, "the pose was given, not estimated: it fixes the coordinate system"),
+            (TRACKED, "the pose follows from the measurements"),
+            (PREDICTED, "too little was measured: the pose continues the motion of the frames before"),
+            (
+                LOST,
+                "too little was measured, and there was no motion to continue: the pose of the frame before",
+            ),
         ],
     },
     Family {

@@ -4,9 +4,10 @@ use super::manifest::Manifest;
 use super::record::Record;
 use super::table::{for_each_frame_table, for_each_table};
 use super::{
-    Camera, CameraId, Frame, FrameStatistics, GraphFactor, GraphLine, GraphPoint, GraphPose,
+    Camera, CameraId, Frame, FrameStatistics, GraphFactor, GraphLine, GraphPoint, GraphPose, Iteration,
     LineCorrespondence, LineLandmark, LineMeasurement, LineObservation, MapLine, MapPoint,
-    PointCorrespondence, PointLandmark, PointMeasurement, PointObservation, StructuralGroup, TrajectoryPose,
+    PointCorrespondence, PointLandmark, PointMeasurement, PointObservation, StructuralGroup, TrackedFrame,
+    TrajectoryPose,
 };
 
 macro_rules! sequence {

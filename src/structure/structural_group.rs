@@ -39,6 +39,12 @@ impl StructuralGroup {
         [registry::MANHATTAN, registry::ATLANTA].contains(&self.kind.as_str())
     }
 
+    /// The same group with its direction left out, which an estimator may not be told.
+    #[must_use]
+    pub fn without_direction(&self) -> Self {
+        Self { direction_x: None, direction_y: None, direction_z: None, ..self.clone() }
+    }
+
     /// Common direction in `world`; `None` when it is not known or not whole.
     #[must_use]
     pub fn direction(&self) -> Option<Vector3<f64>> {

@@ -14,6 +14,8 @@ macro_rules! for_each_table {
             structural_groups: StructuralGroup,
             map_points: MapPoint,
             map_lines: MapLine,
+            tracking: TrackedFrame,
+            iterations: Iteration,
             point_correspondences: PointCorrespondence,
             line_correspondences: LineCorrespondence,
             graph_poses: GraphPose,

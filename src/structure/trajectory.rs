@@ -34,7 +34,10 @@ record! {
         /// Estimated rotation, Hamilton quaternion, w.
         ["1", "world_from_camera"]
         world_from_camera_qw: f64,
+        /// Upper triangle, row by row, of the covariance of the tangent `[rotation; translation]` (rad, m) that is applied on the left of `world_from_camera`: 21 numbers; absent where it is not known.
+        ["rad, m", "world", "1.3.0"]
+        covariance: Option<Vec<f64>>,
     }
 }
 
-stored_pose!(TrajectoryPose { estimate: String, frame_id: FrameId });
+stored_pose!(TrajectoryPose { estimate: String, frame_id: FrameId } absent: covariance);

@@ -132,7 +132,7 @@ pub(crate) fn sample() -> Sequence {
     ];
     let estimate = registry::MAP_TO_FRAME.to_owned();
     sequence.map_points =
-        vec![MapPoint { estimate: estimate.clone(), point_id: point, x: 1.0, y: 2.0, z: 5.0 }];
+        vec![MapPoint { estimate: estimate.clone(), point_id: point, x: 1.0, y: 2.0, z: 5.0, covariance: None }];
     sequence.map_lines = vec![MapLine {
         estimate,
         line_id: line,
@@ -142,6 +142,7 @@ pub(crate) fn sample() -> Sequence {
         end_x: end.x,
         end_y: end.y,
         end_z: end.z,
+        covariance: None,
     }];
     sequence.point_observations = vec![
         PointObservation { frame_id: first, point_id: point, u: 419.5, v: 239.5, depth: Some(5.0) },

@@ -190,6 +190,7 @@ impl Found {
                 end_x: before.end.x,
                 end_y: before.end.y,
                 end_z: before.end.z,
+                covariance: None,
             });
         }
         let points: Vec<PointLandmark> = (0..)

@@ -166,7 +166,7 @@ pub(super) fn add_estimates(estimates: &Estimates, sequence: &mut Sequence) {
 }
 
 fn map_point(estimate: &str, point_id: PointId, at: &Point3<f64>) -> MapPoint {
-    MapPoint { estimate: estimate.to_owned(), point_id, x: at.x, y: at.y, z: at.z }
+    MapPoint { estimate: estimate.to_owned(), point_id, x: at.x, y: at.y, z: at.z, covariance: None }
 }
 
 /// A row of `map_lines`.
@@ -184,6 +184,7 @@ pub(super) fn map_line(
         end_x: segment.end.x,
         end_y: segment.end.y,
         end_z: segment.end.z,
+        covariance: None,
     }
 }
 

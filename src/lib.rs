@@ -13,6 +13,7 @@ pub mod plot;
 pub mod simulate;
 pub mod statistics;
 pub mod structure;
+pub mod track;
 mod unfinished;
 pub mod validate;
 

@@ -4,6 +4,7 @@
 pub mod archive;
 #[cfg(feature = "cli")]
 pub mod cli;
+pub mod covisibility;
 pub mod datasets;
 #[cfg(feature = "fetch")]
 pub mod fetch;

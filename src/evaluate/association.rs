@@ -3,6 +3,7 @@
 use std::cmp::Ordering;
 use std::fmt::Display;
 
+use super::reconstruction::listed;
 use super::{Error, Similarity};
 use crate::geometry::Pose;
 
@@ -131,21 +132,10 @@ pub(super) fn path_m(poses: &[Pose]) -> Vec<f64> {
 
 /// Poses by ascending id, each id once, all numbers finite.
 fn sorted<I: Copy + Ord + Display>(of: &'static str, poses: &[(I, Pose)]) -> Result<Vec<(I, Pose)>, Error> {
-    let mut poses = poses.to_vec();
-    poses.sort_by_key(|(id, _)| *id);
-    if let Some(twice) = poses.windows(2).find(|pair| pair[0].0 == pair[1].0) {
-        return Err(Error::Twice { of, id: twice[0].0.to_string() });
-    }
-    for (id, pose) in &poses {
-        let (translation, rotation) = pose.components();
-        // A number whose square overflows has no distance either.
-        if let Some(found) =
-            translation.iter().chain(&rotation).find(|number| !(*number * *number).is_finite())
-        {
-            return Err(Error::NotFinite { of, id: id.to_string(), found: *found });
-        }
-    }
-    Ok(poses)
+    listed(of, poses.to_vec(), |pose| {
+        let ([x, y, z], [i, j, k, w]) = pose.components();
+        [x, y, z, i, j, k, w]
+    })
 }
 
 /// To each stamp of a list the nearest of another; both ascending.

@@ -6,6 +6,7 @@ pub mod archive;
 pub mod cli;
 pub mod covisibility;
 pub mod datasets;
+pub mod evaluate;
 #[cfg(feature = "fetch")]
 pub mod fetch;
 pub mod format;

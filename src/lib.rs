@@ -4,7 +4,9 @@
 pub mod archive;
 #[cfg(feature = "cli")]
 pub mod cli;
+pub mod covisibility;
 pub mod datasets;
+pub mod evaluate;
 #[cfg(feature = "fetch")]
 pub mod fetch;
 pub mod format;

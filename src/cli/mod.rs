@@ -6,8 +6,10 @@ mod completions;
 mod convert;
 mod copy;
 mod explain;
+mod extended;
 mod fetch;
 mod fetch_progress;
+mod graph;
 mod info;
 mod left_behind;
 mod man;
@@ -52,6 +54,7 @@ enum Command {
     Copy(copy::Args),
     Simulate(simulate::Args),
     Measure(measure::Args),
+    Graph(graph::Args),
     Stats(stats::Args),
     Plot(plot::Args),
     Schema(schema::Args),
@@ -90,6 +93,7 @@ pub fn main() -> ExitCode {
         Command::Copy(args) => copy::run(args, &mut stdout),
         Command::Simulate(args) => simulate::run(args, &mut stdout),
         Command::Measure(args) => measure::run(args, &mut stdout),
+        Command::Graph(args) => graph::run(args, &mut stdout),
         Command::Plot(args) => plot::run(args, &mut stdout),
         Command::Stats(args) => stats::run(args, &mut stdout),
         Command::Schema(args) => schema::run(args, &mut stdout),

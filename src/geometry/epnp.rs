@@ -45,7 +45,11 @@ pub fn epnp(camera: &PinholeCamera, points: &[(Point3<f64>, Point2<f64>)]) -> Re
         Error::check_finite(WHAT, pixel.iter())?;
     }
     let frame = ControlFrame::of(points)?;
-    let vectors = if frame.planar { null_space::<9>(camera, points, &frame) } else { null_space::<12>(camera, points, &frame) };
+    let vectors = if frame.planar {
+        null_space::<9>(camera, points, &frame)
+    } else {
+        null_space::<12>(camera, points, &frame)
+    };
     let vectors = vectors.ok_or(Error::Degenerate { what: WHAT, reason: "numbers too large" })?;
     let mut best: Option<(f64, Pose)> = None;
     let combined =
@@ -240,8 +244,10 @@ fn linearised(
         if k == l { product } else { 2.0 * product }
     };
     let system = DMatrix::from_fn(squares.len(), products.len(), entry);
-    let solution =
-        system.try_svd(true, true, f64::EPSILON, 500)?.solve(&DVector::from_column_slice(squares), 1e-14).ok()?;
+    let solution = system
+        .try_svd(true, true, f64::EPSILON, 500)?
+        .solve(&DVector::from_column_slice(squares), 1e-14)
+        .ok()?;
     let value = |product: (usize, usize)| {
         products.iter().position(|candidate| *candidate == product).map(|column| solution[column])
     };
@@ -278,8 +284,7 @@ fn refined(differences: &[[Vector3<f64>; 4]], squares: &[f64], start: Betas, fre
         let (mut hessian, mut gradient) = (Matrix4::<f64>::zeros(), Vector4::zeros());
         for (row, square) in differences.iter().zip(squares) {
             let sum: Vector3<f64> = (0..4).map(|k| row[k] * betas[k]).sum();
-            let derivative =
-                Vector4::from_fn(|k, _| if k < free { 2.0 * sum.dot(&row[k]) } else { 0.0 });
+            let derivative = Vector4::from_fn(|k, _| if k < free { 2.0 * sum.dot(&row[k]) } else { 0.0 });
             hessian.ger(1.0, &derivative, &derivative, 1.0);
             gradient += derivative * (sum.norm_squared() - square);
         }
@@ -315,7 +320,8 @@ mod tests {
     /// Spread of the points along their narrowest axis, metres.
     fn thickness(points: &[Point3<f64>]) -> f64 {
         let mean = points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / points.len() as f64;
-        let spread: Matrix3<f64> = points.iter().map(|p| (p.coords - mean) * (p.coords - mean).transpose()).sum();
+        let spread: Matrix3<f64> =
+            points.iter().map(|p| (p.coords - mean) * (p.coords - mean).transpose()).sum();
         (spread.symmetric_eigenvalues().min() / points.len() as f64).max(0.0).sqrt()
     }
 
@@ -385,7 +391,8 @@ mod tests {
         assert!(matches!(epnp(&camera, &[pair(0.0, 0.0, 2.0); 9]), Err(Error::Degenerate { .. })));
         let line: Vec<_> = (0..9).map(|k| pair(f64::from(k) * 0.1, 0.3, 2.0)).collect();
         assert!(matches!(epnp(&camera, &line), Err(Error::Degenerate { .. })));
-        let mut hostile: Vec<_> = (0..9).map(|k| pair(f64::from(k) * 0.1, f64::from(k * k) * 0.02, 2.0)).collect();
+        let mut hostile: Vec<_> =
+            (0..9).map(|k| pair(f64::from(k) * 0.1, f64::from(k * k) * 0.02, 2.0)).collect();
         hostile[3].0.x = f64::NAN;
         assert!(matches!(epnp(&camera, &hostile), Err(Error::NotFinite { .. })));
         for number in [f64::MAX, 1e200] {

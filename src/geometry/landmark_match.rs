@@ -158,9 +158,15 @@ impl PointMatch {
         let (x, y) = (seen.x / z, seen.y / z);
         let mut residual = Residual::<3, 3>::empty();
         let mut by_seen = Matrix3::new(
-            camera.fx / z, 0.0, -camera.fx * x / z,
-            0.0, camera.fy / z, -camera.fy * y / z,
-            0.0, 0.0, 0.0,
+            camera.fx / z,
+            0.0,
+            -camera.fx * x / z,
+            0.0,
+            camera.fy / z,
+            -camera.fy * y / z,
+            0.0,
+            0.0,
+            0.0,
         );
         residual.error[0] = camera.fx * x + camera.cx - self.pixel.x;
         residual.error[1] = camera.fy * y + camera.cy - self.pixel.y;
@@ -240,7 +246,9 @@ impl LineMatch {
         let image = matrix * n;
         let length = Vector2::new(image.x, image.y).norm();
         // Relative to its other components: a plane parallel to the image has its line at infinity.
-        if !(length > 1e-12 * (camera.fx * camera.fy).abs() * n.norm() / camera.fx.abs().max(camera.fy.abs()) && length.is_finite()) {
+        if !(length > 1e-12 * (camera.fx * camera.fy).abs() * n.norm() / camera.fx.abs().max(camera.fy.abs())
+            && length.is_finite())
+        {
             return None;
         }
         let mut residual = Residual::<4, 4>::empty();

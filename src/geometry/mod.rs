@@ -22,8 +22,8 @@
 //! # Ok::<(), open_structure::geometry::Error>(())
 //! ```
 
-mod camera;
 mod absolute_orientation;
+mod camera;
 mod direction;
 mod epnp;
 mod error;
@@ -54,8 +54,8 @@ pub use landmark_match::{LineMatch, MeasuredDepth, PointMatch, Residual};
 pub use line_fit::{LineFit, fit_line};
 pub use line_residual::line_residual;
 pub use orthonormal_line::OrthonormalLine;
-pub use plucker_line::PluckerLine;
 pub use p3p::p3p;
+pub use plucker_line::PluckerLine;
 pub use pose::Pose;
 pub use pose_ransac::{PoseConsensus, RansacOptions, ransac_pose};
 pub use pose_refinement::{PoseRefinement, refine_pose};

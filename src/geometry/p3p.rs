@@ -25,7 +25,8 @@ pub fn p3p(points: &[Point3<f64>; 3], rays: &[Vector3<f64>; 3]) -> Vec<Pose> {
     let sides = [(0, 1), (0, 2), (1, 2)].map(|(i, j)| (points[i] - points[j]).norm_squared());
     let area = (points[1] - points[0]).cross(&(points[2] - points[0])).norm_squared();
     let longest = sides[0].max(sides[1]).max(sides[2]);
-    let finite = points.iter().flat_map(|point| point.iter()).chain(rays.iter().flatten()).all(|n| n.is_finite());
+    let finite =
+        points.iter().flat_map(|point| point.iter()).chain(rays.iter().flatten()).all(|n| n.is_finite());
     if !finite || area.is_nan() || area <= 1e-14 * longest * longest {
         return Vec::new();
     }
@@ -219,7 +220,8 @@ mod tests {
     fn points_on_a_line_and_numbers_that_are_none_have_no_pose() {
         let along = [0.0, 1.0, 3.0].map(|x| Point3::new(x, 0.0, 4.0));
         assert!(p3p(&along, &along.map(|point| point.coords.normalize())).is_empty());
-        let hostile = [Point3::new(f64::NAN, 0.0, 1.0), Point3::new(1.0, 0.0, 4.0), Point3::new(0.0, 1.0, 4.0)];
+        let hostile =
+            [Point3::new(f64::NAN, 0.0, 1.0), Point3::new(1.0, 0.0, 4.0), Point3::new(0.0, 1.0, 4.0)];
         assert!(p3p(&hostile, &hostile.map(|point| point.coords.normalize())).is_empty());
         assert!(p3p(&[Point3::new(1.0, 2.0, 3.0); 3], &[Vector3::z(); 3]).is_empty());
     }

@@ -77,8 +77,7 @@ pub fn ransac_pose(
     let (_, pose, _) = best
         .filter(|(_, _, inliers)| *inliers >= 4)
         .ok_or(Error::Degenerate { what: WHAT, reason: "no four points agree on one" })?;
-    let inliers =
-        (0..count).filter(|index| squared_error(camera, &points[*index], &pose) <= limit).collect();
+    let inliers = (0..count).filter(|index| squared_error(camera, &points[*index], &pose) <= limit).collect();
     Ok(PoseConsensus { camera_from_world: pose, inliers, samples })
 }
 
@@ -99,8 +98,14 @@ fn draw(generator: &mut ChaCha8Rng, count: usize) -> [usize; 3] {
 }
 
 /// Squared error in squared sigma; infinite behind the camera.
-fn squared_error(camera: &PinholeCamera, (point, pixel, sigma): &(Point3<f64>, Point2<f64>, f64), pose: &Pose) -> f64 {
-    camera.project(pose * *point).map_or(f64::INFINITY, |found| (found - pixel).norm_squared() / (sigma * sigma))
+fn squared_error(
+    camera: &PinholeCamera,
+    (point, pixel, sigma): &(Point3<f64>, Point2<f64>, f64),
+    pose: &Pose,
+) -> f64 {
+    camera
+        .project(pose * *point)
+        .map_or(f64::INFINITY, |found| (found - pixel).norm_squared() / (sigma * sigma))
 }
 
 /// Sum of truncated errors and number of inliers; `None` when it is not less than `least`.
@@ -137,7 +142,11 @@ fn samples_for(share: f64, options: &RansacOptions) -> u32 {
     if needed.is_nan() || needed >= f64::from(options.most_samples) {
         return options.most_samples;
     }
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between one and most_samples")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "between one and most_samples"
+    )]
     let needed = needed.ceil().max(1.0) as u32;
     needed
 }

@@ -25,8 +25,7 @@ fn line_match(camera: &PinholeCamera, pose: &Pose, segment: Segment, with_depth:
         segment,
         covariance: Matrix4::zeros(),
         ends_px: ends.map(|end| camera.project(end).unwrap()),
-        depths: ends
-            .map(|end| with_depth.then_some(MeasuredDepth::Direct { depth_m: end.z, sigma_m: 0.05 })),
+        depths: ends.map(|end| with_depth.then_some(MeasuredDepth::Direct { depth_m: end.z, sigma_m: 0.05 })),
     }
 }
 
@@ -98,7 +97,8 @@ fn errors_of_noisy_poses_are_as_large_as_the_information_says() {
                 line.covariance = Matrix4::from_diagonal_element(0.02 * 0.02);
                 let across = LineMatch::across(&line.segment).unwrap();
                 let mut shift = || across * nalgebra::Vector2::from_fn(|_, _| 0.02 * normal(&mut generator));
-                line.segment = Segment { start: line.segment.start + shift(), end: line.segment.end + shift() };
+                line.segment =
+                    Segment { start: line.segment.start + shift(), end: line.segment.end + shift() };
             }
         }
         let found = refine_pose(&camera, 1.0, &pose, &points, &lines, RobustLoss::Squared).unwrap();
@@ -115,14 +115,18 @@ fn four_of_ten_points_may_be_wrong() {
     let camera = PinholeCamera::new(520.0, -480.0, 320.0, 240.0, 640, 480).unwrap();
     let mut generator = ChaCha8Rng::seed_from_u64(1);
     for run in 0..20 {
-        let pose = Pose::exp(&Vector6::from_fn(|k, _| if k == 5 { 5.0 } else { 0.3 * normal(&mut generator) }));
+        let pose =
+            Pose::exp(&Vector6::from_fn(|k, _| if k == 5 { 5.0 } else { 0.3 * normal(&mut generator) }));
         let mut points = Vec::new();
         for k in 0..60 {
             let point = Point3::from(Vector3::from_fn(|_, _| 0.5 * normal(&mut generator)));
             let mut found = point_match(&camera, &pose, point, false);
             found.pixel += nalgebra::Vector2::from_fn(|_, _| normal(&mut generator));
             if k % 5 < 2 {
-                found.pixel = Point2::new(320.0 + 100.0 * normal(&mut generator), 240.0 + 80.0 * normal(&mut generator));
+                found.pixel = Point2::new(
+                    320.0 + 100.0 * normal(&mut generator),
+                    240.0 + 80.0 * normal(&mut generator),
+                );
             }
             points.push(found);
         }
@@ -133,7 +137,8 @@ fn four_of_ten_points_may_be_wrong() {
         assert!(consensus.samples < 500, "{}", consensus.samples);
         let inliers: Vec<_> = consensus.inliers.iter().map(|index| points[*index]).collect();
         let found =
-            refine_pose(&camera, 1.0, &consensus.camera_from_world, &inliers, &[], RobustLoss::Squared).unwrap();
+            refine_pose(&camera, 1.0, &consensus.camera_from_world, &inliers, &[], RobustLoss::Squared)
+                .unwrap();
         // 1 px of 500 at 5 m over six points of ten of 60: a centimetre or two, and less than 0.03 rad.
         assert!(error(&found.camera_from_world, &pose) < 0.1, "{}", error(&found.camera_from_world, &pose));
         assert!(inliers.len() >= 32, "{}", inliers.len());

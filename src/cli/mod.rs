@@ -21,6 +21,7 @@ mod schema;
 mod simulate;
 mod stats;
 mod text;
+mod track;
 mod validate;
 
 use std::io::{self, IsTerminal, Write};
@@ -55,6 +56,7 @@ enum Command {
     Simulate(simulate::Args),
     Measure(measure::Args),
     Graph(graph::Args),
+    Track(track::Args),
     Stats(stats::Args),
     Plot(plot::Args),
     Schema(schema::Args),
@@ -94,6 +96,7 @@ pub fn main() -> ExitCode {
         Command::Simulate(args) => simulate::run(args, &mut stdout),
         Command::Measure(args) => measure::run(args, &mut stdout),
         Command::Graph(args) => graph::run(args, &mut stdout),
+        Command::Track(args) => track::run(args, &mut stdout),
         Command::Plot(args) => plot::run(args, &mut stdout),
         Command::Stats(args) => stats::run(args, &mut stdout),
         Command::Schema(args) => schema::run(args, &mut stdout),

@@ -1,5 +1,6 @@
 //! Measurements instead of images: the Open-Structure format, its validator and its tools.
 
+pub mod adjust;
 #[cfg(feature = "archive")]
 pub mod archive;
 #[cfg(feature = "cli")]

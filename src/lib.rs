@@ -3,6 +3,7 @@
 pub mod adjust;
 #[cfg(feature = "archive")]
 pub mod archive;
+pub mod benchmark;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod covisibility;

@@ -1,5 +1,6 @@
 //! The command line: arguments in, calls to the rooms below, rendering out.
 
+mod benchmark;
 mod cat;
 mod chart;
 mod completions;
@@ -56,6 +57,7 @@ enum Command {
     Simulate(simulate::Args),
     Measure(measure::Args),
     Graph(graph::Args),
+    Benchmark(benchmark::Args),
     Track(track::Args),
     Stats(stats::Args),
     Plot(plot::Args),
@@ -97,6 +99,7 @@ pub fn main() -> ExitCode {
         Command::Measure(args) => measure::run(args, &mut stdout),
         Command::Graph(args) => graph::run(args, &mut stdout),
         Command::Track(args) => track::run(args, &mut stdout),
+        Command::Benchmark(args) => benchmark::run(args, &mut stdout),
         Command::Plot(args) => plot::run(args, &mut stdout),
         Command::Stats(args) => stats::run(args, &mut stdout),
         Command::Schema(args) => schema::run(args, &mut stdout),

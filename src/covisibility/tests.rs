@@ -56,16 +56,17 @@ fn world() -> World {
         let inside = pose.inverse() * *point;
         camera().project(inside).filter(|pixel| camera().contains(*pixel, 0.0)).map(|pixel| (pixel, inside.z))
     };
+    let (all_points, all_lines) = (points(), lines());
     let frames = (0..FRAMES)
         .map(|frame| {
             let frame_id = FrameId(frame as i64);
             let pose = pose(frame);
-            let points = points().iter().enumerate().filter_map(|(id, point)| {
+            let points = all_points.iter().enumerate().filter_map(|(id, point)| {
                 let (pixel, depth) = seen(&pose, point)?;
                 let point_id = PointId(id as i64);
                 Some(PointMeasurement { frame_id, point_id, u: pixel.x, v: pixel.y, depth: Some(depth) })
             });
-            let lines = lines().iter().enumerate().filter_map(|(id, line)| {
+            let lines = all_lines.iter().enumerate().filter_map(|(id, line)| {
                 let ((start, near), (end, far)) = seen(&pose, &line.start).zip(seen(&pose, &line.end))?;
                 Some(LineMeasurement {
                     frame_id,

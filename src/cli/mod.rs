@@ -1,5 +1,6 @@
 //! The command line: arguments in, calls to the rooms below, rendering out.
 
+mod adjust;
 mod cat;
 mod chart;
 mod completions;
@@ -52,6 +53,7 @@ enum Command {
     Copy(copy::Args),
     Simulate(simulate::Args),
     Measure(measure::Args),
+    Adjust(adjust::Args),
     Stats(stats::Args),
     Plot(plot::Args),
     Schema(schema::Args),
@@ -90,6 +92,7 @@ pub fn main() -> ExitCode {
         Command::Copy(args) => copy::run(args, &mut stdout),
         Command::Simulate(args) => simulate::run(args, &mut stdout),
         Command::Measure(args) => measure::run(args, &mut stdout),
+        Command::Adjust(args) => adjust::run(args, &mut stdout),
         Command::Plot(args) => plot::run(args, &mut stdout),
         Command::Stats(args) => stats::run(args, &mut stdout),
         Command::Schema(args) => schema::run(args, &mut stdout),

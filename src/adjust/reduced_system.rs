@@ -75,10 +75,13 @@ impl ReducedSystem {
             }
         }
         let values = vec![0.0; indices.len()];
+        let (upper_starts, upper_indices) = transposed(rows, &starts, &indices);
+        let upper = SymbolicSparseColMat::new_checked(rows, rows, upper_starts, None, upper_indices);
         let matrix = SymbolicSparseColMat::new_checked(rows, rows, starts, None, indices);
+        // The analysis looks at the upper triangle alone.
         let symbolic = factorize_symbolic_cholesky(
-            matrix.as_ref(),
-            Side::Lower,
+            upper.as_ref(),
+            Side::Upper,
             SymmetricOrdering::Identity,
             CholeskySymbolicParams::default(),
         )
@@ -197,6 +200,24 @@ impl ReducedSystem {
             }
         }
     }
+}
+
+/// Starts and row indices of the transposed pattern, ascending.
+fn transposed(rows: usize, starts: &[u32], indices: &[u32]) -> (Vec<u32>, Vec<u32>) {
+    let mut upper = vec![0_u32; rows + 1];
+    indices.iter().for_each(|row| upper[*row as usize + 1] += 1);
+    for row in 0..rows {
+        upper[row + 1] += upper[row];
+    }
+    let (mut next, mut found) = (upper.clone(), vec![0_u32; indices.len()]);
+    for (column, window) in (0_u32..).zip(starts.windows(2)) {
+        for row in &indices[window[0] as usize..window[1] as usize] {
+            let at = &mut next[*row as usize];
+            found[*at as usize] = column;
+            *at += 1;
+        }
+    }
+    (upper, found)
 }
 
 fn too_large(found: usize) -> Error {

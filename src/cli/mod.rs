@@ -1,6 +1,7 @@
 //! The command line: arguments in, calls to the rooms below, rendering out.
 
 mod benchmark;
+mod adjust;
 mod cat;
 mod chart;
 mod completions;
@@ -59,6 +60,7 @@ enum Command {
     Graph(graph::Args),
     Benchmark(benchmark::Args),
     Track(track::Args),
+    Adjust(adjust::Args),
     Stats(stats::Args),
     Plot(plot::Args),
     Schema(schema::Args),
@@ -100,6 +102,7 @@ pub fn main() -> ExitCode {
         Command::Graph(args) => graph::run(args, &mut stdout),
         Command::Track(args) => track::run(args, &mut stdout),
         Command::Benchmark(args) => benchmark::run(args, &mut stdout),
+        Command::Adjust(args) => adjust::run(args, &mut stdout),
         Command::Plot(args) => plot::run(args, &mut stdout),
         Command::Stats(args) => stats::run(args, &mut stdout),
         Command::Schema(args) => schema::run(args, &mut stdout),

@@ -37,6 +37,8 @@ pub(super) struct Alignment {
     /// Whether each point, and each line, agrees.
     pub(super) points: Vec<bool>,
     pub(super) lines: Vec<bool>,
+    /// Numbers that were measured of those that agree.
+    pub(super) numbers: usize,
     /// Root mean square of the whitened residuals of those that agree.
     pub(super) residual_rms: f64,
 }
@@ -113,6 +115,8 @@ impl Matches<'_> {
                 let Verdict { points, lines, .. } = verdict;
                 let alignment =
                     Alignment { camera_from_world: pose, covariance, points, lines, residual_rms };
+                let Verdict { points, lines, numbers, .. } = verdict;
+                let alignment = Alignment { camera_from_world: pose, covariance, points, lines, numbers, residual_rms };
                 return Some((alignment, inliers));
             }
         }

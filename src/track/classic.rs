@@ -11,8 +11,8 @@ use super::{Error, FrameTrack, TrackState, Tracker, TrackerMap};
 use crate::geometry::{PinholeCamera, Pose, Segment, epnp};
 use crate::structure::{LineId, MapLine, MapPoint, MeasuredFrame, PointId};
 
-/// `EPnP` needs four points; six determine a pose without ambiguity.
-const LEAST_POINTS: usize = 6;
+/// Under eight points the noise of `EPnP`'s algebraic error outweighs what they tell.
+const LEAST_POINTS: usize = 8;
 
 /// After so many predicted frames in a row nobody knows where the camera is.
 const MOST_PREDICTED: u32 = 30;
@@ -50,6 +50,7 @@ pub(super) struct ClassicTracker {
     /// Points of the last frame, in the world.
     last: BTreeMap<PointId, Point3<f64>>,
     predicted: u32,
+    ever_tracked: bool,
 }
 
 impl ClassicTracker {
@@ -62,6 +63,7 @@ impl ClassicTracker {
             lines: BTreeMap::new(),
             last: BTreeMap::new(),
             predicted: 0,
+            ever_tracked: false,
         }
     }
 
@@ -91,12 +93,28 @@ impl ClassicTracker {
                 .entry(sighting.id)
                 .and_modify(|mean| mean.add(place))
                 .or_insert_with(|| Mean::of(place));
+    fn learn(&mut self, camera: &PinholeCamera, pose: &Pose, points: &[PointSighting], lines: &[LineSighting]) {
+        // After a predicted frame, points of the last one that was tracked stay the better known ones.
+        if self.predicted == 0 {
+            self.last.clear();
+        }
+            self.last.entry(sighting.id).or_insert(place);
+            // A guessed pose brings in what is new, and leaves alone what is known.
+            let known = self.points.entry(sighting.id);
+            if self.predicted == 0 {
+                known.and_modify(|mean| mean.add(place)).or_insert_with(|| Mean::of(place));
+            } else {
+                known.or_insert_with(|| Mean::of(place));
+            }
         }
         for sighting in lines {
             let [Some(start), Some(end)] = sighting.depths else { continue };
             let start = pose * camera.back_project(sighting.ends_px[0], start.depth_m());
             let end = pose * camera.back_project(sighting.ends_px[1], end.depth_m());
             if let Some(means) = self.lines.get_mut(&sighting.id) {
+                if self.predicted > 0 {
+                    continue;
+                }
                 let [known_start, known_end] = means.map(|mean| mean.place());
                 // Ends come in either order.
                 let turned = (start - known_end).norm_squared() + (end - known_start).norm_squared()
@@ -142,8 +160,15 @@ impl Tracker for ClassicTracker {
                 let mean = squares.sum::<f64>() / (2 * pairs.len()) as f64;
                 track.residual_rms = Some(mean.sqrt() / noise.sigma_px);
                 self.predicted = 0;
+                self.ever_tracked = true;
             } else {
                 self.predicted += 1;
+                if !self.ever_tracked && pairs.is_empty() {
+                    // Nothing joins the first frame to this one: the map begins here.
+                    self.points.clear();
+                    self.lines.clear();
+                    self.last.clear();
+                }
                 track.state =
                     if self.predicted > MOST_PREDICTED { TrackState::Lost } else { TrackState::Predicted };
                 track.world_from_camera = predicted;

@@ -24,6 +24,9 @@ const MOST_PREDICTED: u32 = 30;
 /// With fewer matches than this there is nothing known in view, and the map goes on from the predicted pose.
 const FEW_MATCHES: usize = 3;
 
+/// With fewer numbers measured of known landmarks, new ones are taken sooner.
+const FEW_NUMBERS: usize = 30;
+
 /// How much of the map is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Memory {
@@ -50,6 +53,8 @@ pub(super) struct LandmarkTracker {
     covariance: Matrix6<f64>,
     /// Predicted frames in a row.
     predicted: u32,
+    /// Whether any frame was tracked yet.
+    ever_tracked: bool,
 }
 
 /// What was measured in a frame, and what is known of it.
@@ -75,6 +80,7 @@ impl LandmarkTracker {
             past_lines: BTreeMap::new(),
             covariance: Matrix6::zeros(),
             predicted: 0,
+            ever_tracked: false,
         }
     }
 
@@ -104,7 +110,9 @@ impl LandmarkTracker {
         let agrees = |flags: Option<&Vec<bool>>, places: &[usize], place: usize| {
             flags.and_then(|flags| places.binary_search(&place).ok().map(|at| flags[at]))
         };
-        if self.memory == Memory::LastFrame {
+        let starving = alignment.is_none_or(|alignment| alignment.numbers < FEW_NUMBERS);
+        // After a predicted frame, the last one that was tracked still counts.
+        if self.memory == Memory::LastFrame && alignment.is_some() {
             self.past_points.append(&mut self.points);
             self.past_lines.append(&mut self.lines);
             self.pending_points.retain(|id, _| seen.points.binary_search_by_key(id, |s| s.id).is_ok());
@@ -113,7 +121,7 @@ impl LandmarkTracker {
         for (place, sighting) in seen.points.iter().enumerate() {
             let agreed = agrees(alignment.map(|a| &a.points), &seen.point_places, place);
             if let Some(landmark) = self.points.get_mut(&sighting.id) {
-                match agreed {
+                match agreed.filter(|_| self.memory == Memory::Whole) {
                     Some(true) => landmark.fuse(view, sighting),
                     Some(false) => {
                         landmark.contradictions += 1;
@@ -130,7 +138,7 @@ impl LandmarkTracker {
                 self.pending_points.remove(&sighting.id);
             }
             let landmark = PointLandmark::from_depth(view, sighting)
-                .or_else(|| self.pending_points.entry(sighting.id).or_default().push(view, sighting));
+                .or_else(|| self.pending_points.entry(sighting.id).or_default().push(view, sighting, starving));
             if let Some(landmark) = landmark {
                 self.points.insert(sighting.id, landmark);
                 if self.memory == Memory::Whole {
@@ -141,7 +149,7 @@ impl LandmarkTracker {
         for (place, sighting) in seen.lines.iter().enumerate() {
             let agreed = agrees(alignment.map(|a| &a.lines), &seen.line_places, place);
             if let Some(landmark) = self.lines.get_mut(&sighting.id) {
-                match agreed {
+                match agreed.filter(|_| self.memory == Memory::Whole) {
                     Some(true) => landmark.fuse(view, sighting),
                     Some(false) => {
                         landmark.contradictions += 1;
@@ -157,7 +165,7 @@ impl LandmarkTracker {
                 self.pending_lines.remove(&sighting.id);
             }
             let landmark = LineLandmark::from_depth(view, sighting)
-                .or_else(|| self.pending_lines.entry(sighting.id).or_default().push(view, sighting));
+                .or_else(|| self.pending_lines.entry(sighting.id).or_default().push(view, sighting, starving));
             if let Some(landmark) = landmark {
                 self.lines.insert(sighting.id, landmark);
                 if self.memory == Memory::Whole {
@@ -231,6 +239,7 @@ impl Tracker for LandmarkTracker {
                 self.motion.push(frame.stamp_nanos, world_from_camera);
             }
             self.predicted = 0;
+            self.ever_tracked = true;
             let agree = |flags: &[bool]| flags.iter().filter(|agrees| **agrees).count();
             return Ok(FrameTrack {
                 state: TrackState::Tracked,
@@ -245,7 +254,13 @@ impl Tracker for LandmarkTracker {
         let last = self.motion.last().unwrap_or(predicted);
         self.covariance = self.predicted_covariance(&last, &predicted);
         self.motion.push(frame.stamp_nanos, predicted);
-        if self.memory == Memory::LastFrame || matched[0] + matched[1] < FEW_MATCHES {
+        let few = matched[0] + matched[1] < FEW_MATCHES;
+        if few && !self.ever_tracked {
+            // Nothing joins the first frame to this one: the map begins here.
+            self.points.clear();
+            self.lines.clear();
+        }
+        if self.memory == Memory::LastFrame || few {
             let covariance = self.view_covariance(&predicted.inverse(), &self.covariance);
             self.learn(&view(&predicted, covariance), &seen, None);
         }

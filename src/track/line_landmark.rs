@@ -3,15 +3,12 @@
 use nalgebra::{Matrix3x2, Matrix4, Matrix6, Point2, Point3, Vector3};
 
 use super::fusion::{back_projected, fuse, inverse};
-use super::point_landmark::View;
+use super::point_landmark::{View, most_doubt};
 use super::sighting::LineSighting;
 use crate::geometry::{LineMatch, LineView, Pose, Segment, triangulate_line};
 
 /// Planes of a line without depth must differ by this much before it is triangulated, radians.
 const LEAST_PARALLAX: f64 = 0.04;
-
-/// A triangulated line whose ends are less certain than this share of their distance waits for more.
-const MOST_DOUBT: f64 = 0.2;
 
 /// Views of a line without depth that are kept at most.
 const MOST_VIEWS: usize = 32;
@@ -167,7 +164,14 @@ pub(super) struct PendingLine {
 
 impl PendingLine {
     /// Takes a measurement; gives the line where it is known well enough by now.
-    pub(super) fn push(&mut self, view: &View, sighting: &LineSighting) -> Option<LineLandmark> {
+    ///
+    /// * `starving` — whether there is little else to track against.
+    pub(super) fn push(
+        &mut self,
+        view: &View,
+        sighting: &LineSighting,
+        starving: bool,
+    ) -> Option<LineLandmark> {
         if self.views.len() >= MOST_VIEWS {
             let mut keep = false;
             self.views.retain(|_| {
@@ -185,10 +189,10 @@ impl PendingLine {
         if widest > 1.0 - 0.5 * LEAST_PARALLAX * LEAST_PARALLAX {
             return None;
         }
-        self.triangulated()
+        self.triangulated(most_doubt(starving))
     }
 
-    fn triangulated(&self) -> Option<LineLandmark> {
+    fn triangulated(&self, most_doubt: f64) -> Option<LineLandmark> {
         let observations: Vec<LineView> = self
             .views
             .iter()
@@ -231,5 +235,7 @@ impl PendingLine {
             covariance,
             contradictions: 0,
         })
+        (covariance.trace().sqrt() < most_doubt * distance)
+            .then_some(LineLandmark { segment, covariance, contradictions: 0 })
     }
 }

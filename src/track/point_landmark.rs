@@ -7,10 +7,8 @@ use super::sighting::PointSighting;
 use crate::geometry::{PinholeCamera, PointMatch, PointView, Pose, triangulate_point};
 
 /// Rays of a point without depth must differ by this much before it is triangulated, radians.
-const LEAST_PARALLAX: f64 = 0.02;
+const LEAST_PARALLAX: f64 = 0.03;
 
-/// A triangulated point whose distance is less certain than this share of itself waits for more.
-const MOST_DOUBT: f64 = 0.2;
 
 /// Views of a point without depth that are kept at most; later ones take the place of every other one.
 const MOST_VIEWS: usize = 32;
@@ -83,6 +81,12 @@ impl PointLandmark {
     }
 }
 
+/// How doubtful a triangulated landmark may be, sigma over distance: more where little else is known, for a common error of the first
+/// ones, such as their scale, stays with all that follow.
+pub(super) const fn most_doubt(starving: bool) -> f64 {
+    if starving { 0.2 } else { 0.03 }
+}
+
 /// Where a point without depth was seen, until its place is known.
 #[derive(Clone, Debug, Default)]
 pub(super) struct PendingPoint {
@@ -91,7 +95,14 @@ pub(super) struct PendingPoint {
 
 impl PendingPoint {
     /// Takes a measurement; gives the point where it is known well enough by now.
-    pub(super) fn push(&mut self, view: &View, sighting: &PointSighting) -> Option<PointLandmark> {
+    ///
+    /// * `starving` — whether there is little else to track against.
+    pub(super) fn push(
+        &mut self,
+        view: &View,
+        sighting: &PointSighting,
+        starving: bool,
+    ) -> Option<PointLandmark> {
         if self.views.len() >= MOST_VIEWS {
             let mut keep = false;
             self.views.retain(|_| {
@@ -109,10 +120,10 @@ impl PendingPoint {
         if widest > 1.0 - 0.5 * LEAST_PARALLAX * LEAST_PARALLAX {
             return None;
         }
-        self.triangulated()
+        self.triangulated(most_doubt(starving))
     }
 
-    fn triangulated(&self) -> Option<PointLandmark> {
+    fn triangulated(&self, most_doubt: f64) -> Option<PointLandmark> {
         let observations: Vec<PointView> =
             self.views.iter().map(|(view, pixel)| (view.camera, view.camera_from_world, *pixel)).collect();
         let found = triangulate_point(&observations)?;
@@ -141,5 +152,7 @@ impl PendingPoint {
             covariance,
             contradictions: 0,
         })
+        (covariance.trace().sqrt() < most_doubt * distance)
+            .then_some(PointLandmark { point: found.point, covariance, contradictions: 0 })
     }
 }

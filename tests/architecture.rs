@@ -50,6 +50,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "simulate",
             "statistics",
             "plot",
+            "archive",
             "datasets",
             "fetch",
             "track",

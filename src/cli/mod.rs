@@ -5,6 +5,9 @@ mod chart;
 mod completions;
 mod convert;
 mod copy;
+mod evaluate;
+mod evaluate_output;
+mod evaluate_shown;
 mod explain;
 mod fetch;
 mod fetch_progress;
@@ -53,6 +56,7 @@ enum Command {
     Simulate(simulate::Args),
     Measure(measure::Args),
     Stats(stats::Args),
+    Evaluate(evaluate::Args),
     Plot(plot::Args),
     Schema(schema::Args),
     Fetch(fetch::Args),
@@ -90,6 +94,7 @@ pub fn main() -> ExitCode {
         Command::Copy(args) => copy::run(args, &mut stdout),
         Command::Simulate(args) => simulate::run(args, &mut stdout),
         Command::Measure(args) => measure::run(args, &mut stdout),
+        Command::Evaluate(args) => evaluate::run(args, &mut stdout),
         Command::Plot(args) => plot::run(args, &mut stdout),
         Command::Stats(args) => stats::run(args, &mut stdout),
         Command::Schema(args) => schema::run(args, &mut stdout),

@@ -1,25 +1,20 @@
 //! `os evaluate`: how far estimates are from the truth.
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{self, BufReader, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::ValueEnum;
 
-use super::{Outcome, evaluate_output, evaluate_shown};
+use super::{Outcome, evaluate_files, evaluate_output, evaluate_shown};
 use crate::evaluate::{
-    Alignment, AlignmentKind, Delta, EvaluateOptions, Evaluated, Matched, Reconstruction, Relation, Step,
-    evaluate, evaluate_matched, summary_table,
+    Alignment, AlignmentKind, Delta, EvaluateOptions, Evaluated, Reconstruction, Relation, Step, evaluate,
+    summary_table,
 };
 use crate::format;
-use crate::geometry::Pose;
 use crate::plot;
-use crate::structure::{
-    Frame, FrameId, LineLandmark, MapLine, MapPoint, PointLandmark, PoseRow, TrajectoryPose, TrajectoryRow,
-    read_trajectory,
-};
+use crate::structure::{FrameId, LineLandmark, MapLine, MapPoint, PointLandmark, TrajectoryPose};
 
 /// Compare estimates with the truth: absolute and relative errors of trajectories as evo defines them, errors of maps.
 ///
@@ -169,7 +164,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         let sequences = args.sequences.iter();
         sequences.map(|path| sequence(args, path, &options)).collect::<Result<_, _>>()?
     } else {
-        vec![files(args, &options)?]
+        vec![evaluate_files::compare(&args.files, args.stamps()?, &options)?]
     };
     let relations = args.relations();
     args.output.write(&compared, relations.first().copied())?;
@@ -268,7 +263,7 @@ fn sequence(args: &Args, path: &Path, options: &EvaluateOptions) -> anyhow::Resu
     let mut rows = Vec::new();
     for name in wanted {
         let evaluation = evaluate(&reference, &named(name)?, options);
-        rows.push(evaluated(&reader.manifest().name, &args.reference, evaluation, options));
+        rows.push(evaluated(&name_of(path), &args.reference, evaluation, options));
     }
     let upward = plot::upward(&reader.manifest().cameras, frames);
     Ok(Compared {
@@ -278,7 +273,14 @@ fn sequence(args: &Args, path: &Path, options: &EvaluateOptions) -> anyhow::Resu
     })
 }
 
-fn evaluated(
+/// The name of a file or folder without its ending, which tells apart what was made of one sequence.
+pub(super) fn name_of(path: &Path) -> String {
+    let name = if path.is_dir() { path.file_name() } else { path.file_stem() };
+    name.map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
+}
+
+/// A result with the names that tell it apart.
+pub(super) fn evaluated(
     sequence: &str,
     reference: &str,
     evaluation: crate::evaluate::Evaluation,
@@ -294,99 +296,9 @@ fn evaluated(
     }
 }
 
-/// Compares trajectory files with the first of them.
-fn files(args: &Args, options: &EvaluateOptions) -> anyhow::Result<Compared> {
-    let [reference_path, estimate_paths @ ..] = args.files.as_slice() else {
-        anyhow::bail!("--files: expected a reference and estimates");
-    };
-    let reference = read(reference_path)?;
-    let mut rows = Vec::new();
-    for path in estimate_paths {
-        let matched = matched(args, (reference_path, &reference), (path, &read(path)?))?;
-        let evaluation = evaluate_matched(&name_of(path), matched, options);
-        rows.push(evaluated(&name_of(reference_path), &name_of(reference_path), evaluation, options));
-    }
-    let stamp = |(place, row): (i64, &TrajectoryRow)| Some((FrameId(place), row.stamp_nanos?));
-    let frames: Vec<Frame> = (0..)
-        .zip(&reference)
-        .map(|(place, row)| Frame::new(FrameId(place), 0, crate::structure::CameraId(0), Some(row.pose)))
-        .collect();
-    Ok(Compared {
-        rows,
-        stamps: (0..).zip(&reference).filter_map(stamp).collect(),
-        upward: plot::upward(&[], &frames),
-    })
-}
-
-fn name_of(path: &Path) -> String {
-    path.file_stem().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
-}
-
-fn read(path: &Path) -> anyhow::Result<Vec<TrajectoryRow>> {
-    let file = File::open(path).with_context(|| path.display().to_string())?;
-    read_trajectory(BufReader::new(file), None).with_context(|| path.display().to_string())
-}
-
-type Matching = Result<Matched<FrameId>, crate::evaluate::Error>;
-
-/// Matches two files by their stamps, or, where both have none, line by line; ids are places in the reference's file.
-fn matched(
-    args: &Args,
-    (reference_path, reference): (&Path, &[TrajectoryRow]),
-    (path, estimate): (&Path, &[TrajectoryRow]),
-) -> anyhow::Result<Matching> {
-    let poses = |path: &Path, rows: &[TrajectoryRow]| -> anyhow::Result<Vec<(i64, Pose)>> {
-        (0..)
-            .zip(rows)
-            .map(|(place, row)| {
-                let pose = PoseRow::pose(&row.pose)
-                    .with_context(|| format!("{}, line {}", path.display(), row.line))?;
-                Ok((row.stamp_nanos.unwrap_or(place), pose))
-            })
-            .collect()
-    };
-    let (left, right) = (poses(reference_path, reference)?, poses(path, estimate)?);
-    let stamped = |rows: &[TrajectoryRow]| rows.first().is_some_and(|row| row.stamp_nanos.is_some());
-    let found = match (stamped(reference), stamped(estimate)) {
-        (true, true) => {
-            Matched::by_stamp(&left, &right, nanoseconds(args.max_difference)?, nanoseconds(args.offset)?)
-        }
-        (false, false) if left.len() == right.len() => Matched::by_id(&left, &right),
-        (false, false) => anyhow::bail!(
-            "{}: expected {} poses as in the reference, found {}; KITTI files have no stamps by which to match them",
-            path.display(),
-            left.len(),
-            right.len()
-        ),
-        _ => anyhow::bail!("{}: expected stamps in both files or in none", path.display()),
-    };
-    Ok(found.map(|found| {
-        let place = |stamp: &i64| left.partition_point(|(other, _)| other < stamp);
-        let ids = found.ids.iter().map(|stamp| FrameId(i64::try_from(place(stamp)).unwrap_or(i64::MAX)));
-        Matched {
-            ids: ids.collect(),
-            reference: found.reference,
-            estimate: found.estimate,
-            missing: found.missing,
-            extra: found.extra,
-        }
-    }))
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "bounded before")]
-fn nanoseconds(seconds: f64) -> anyhow::Result<i64> {
-    // Written so that NaN is refused.
-    if seconds.abs() <= 9e9 {
-        Ok((seconds * 1e9).round() as i64)
-    } else {
-        anyhow::bail!("expected a number of seconds up to 9e9, found {seconds}")
-    }
-}
-
 impl Args {
     fn options(&self) -> anyhow::Result<EvaluateOptions> {
         let kind = match self.align {
-            Some(Align::None) => AlignmentKind::None,
             Some(Align::Origin) => AlignmentKind::Origin,
             Some(Align::Se3) => AlignmentKind::Se3,
             Some(Align::Sim3) => AlignmentKind::Sim3,
@@ -394,7 +306,7 @@ impl Args {
             None if self.umeyama && self.scale => AlignmentKind::Sim3,
             None if self.scale => AlignmentKind::Scale,
             None if self.umeyama || self.files.is_empty() => AlignmentKind::Se3,
-            None => AlignmentKind::None,
+            Some(Align::None) | None => AlignmentKind::None,
         };
         let delta = match self.rpe_unit {
             Unit::Frames => Delta::Frames(frames(self.rpe_delta)?),
@@ -405,6 +317,13 @@ impl Args {
         let step =
             Step { all_pairs: self.all_pairs, of_reference: self.pairs_from_reference, ..Step::new(delta) };
         Ok(EvaluateOptions { alignment: Alignment { kind, first: self.align_first }, step })
+    }
+
+    fn stamps(&self) -> anyhow::Result<evaluate_files::Stamps> {
+        Ok(evaluate_files::Stamps {
+            most_apart_nanos: nanoseconds(self.max_difference)?,
+            offset_nanos: nanoseconds(self.offset)?,
+        })
     }
 
     fn relations(&self) -> Vec<Relation> {
@@ -433,5 +352,15 @@ fn frames(delta: f64) -> anyhow::Result<usize> {
         Ok(delta as usize)
     } else {
         anyhow::bail!("--rpe-delta: expected a whole number of frames from 1 on, found {delta}")
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "bounded before")]
+fn nanoseconds(seconds: f64) -> anyhow::Result<i64> {
+    // Written so that NaN is refused.
+    if seconds.abs() <= 9e9 {
+        Ok((seconds * 1e9).round() as i64)
+    } else {
+        anyhow::bail!("expected a number of seconds up to 9e9, found {seconds}")
     }
 }

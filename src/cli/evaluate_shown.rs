@@ -3,7 +3,7 @@
 use std::io::Write;
 
 use super::text;
-use crate::evaluate::{EvaluateOptions, Evaluated, Relation, Statistics};
+use crate::evaluate::{EvaluateOptions, Evaluated, PointErrors, Relation, Statistics};
 
 /// A line for each estimate.
 pub(super) fn overview(
@@ -28,7 +28,11 @@ pub(super) fn overview(
     let absent = || "-".to_owned();
     let cells = |row: &Evaluated| {
         let found = &row.evaluation;
-        let mut cells = vec![found.name.clone(), found.matched.to_string(), found.missing.to_string()];
+        // A map without a path misses no pose.
+        let path = found.matched + found.extra > 0 || found.points.is_none() && found.lines.is_none();
+        let counts = [found.matched, found.missing];
+        let mut cells = vec![found.name.clone()];
+        cells.extend(counts.map(|count| if path { count.to_string() } else { absent() }));
         if several {
             cells.insert(0, row.sequence.clone());
         }
@@ -40,7 +44,7 @@ pub(super) fn overview(
             let found = found.points.as_ref();
             cells.push(found.map_or_else(absent, |found| found.ids.len().to_string()));
             cells.push(found.map_or_else(absent, |found| found.missing.to_string()));
-            cells.push(pair(found.and_then(|found| found.statistics()), 100.0));
+            cells.push(pair(found.and_then(PointErrors::statistics), 100.0));
         }
         if lines {
             let found = found.lines.as_ref();

@@ -6,6 +6,7 @@ mod completions;
 mod convert;
 mod copy;
 mod evaluate;
+mod evaluate_files;
 mod evaluate_output;
 mod evaluate_shown;
 mod explain;

@@ -89,7 +89,7 @@ impl Chart {
         let (x, y) = (self.x.place(x)?, self.y.place(y)?);
         let inside = [x, y].iter().all(|place| (-0.001..=1.001).contains(place));
         let Area { left, top, width, height } = self.area;
-        inside.then(|| [left + width * x, top + height * (1.0 - y)])
+        inside.then_some([left + width * x, top + height * (1.0 - y)])
     }
 
     /// A curve; gaps where `None` stands or a number has no place.

@@ -114,7 +114,7 @@ fn draw_map(svg: &mut Svg, panel: Area, path: &ComparedPath<'_>, plane: &Plane) 
     svg.strokes(std::iter::once(placed.as_slice()), 2.0, QUIET, 0.7);
     let worst = errors.iter().copied().filter(|error| error.is_finite()).fold(0.0, f64::max);
     let unit = LengthUnit::of(worst);
-    let colours = Axis::from_zero(worst * unit.per_metre);
+    let colours = Axis::linear(0.0, worst * unit.per_metre);
     let mut strokes: Vec<Vec<[[f64; 2]; 2]>> = vec![Vec::new(); heat::SHADES];
     for (ends, errors) in estimate.windows(2).zip(errors.windows(2)) {
         let [Some(begin), Some(end)] = ends else { continue };

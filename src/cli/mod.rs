@@ -10,8 +10,10 @@ mod evaluate_files;
 mod evaluate_output;
 mod evaluate_shown;
 mod explain;
+mod extended;
 mod fetch;
 mod fetch_progress;
+mod graph;
 mod info;
 mod left_behind;
 mod man;
@@ -23,6 +25,7 @@ mod schema;
 mod simulate;
 mod stats;
 mod text;
+mod track;
 mod validate;
 
 use std::io::{self, IsTerminal, Write};
@@ -56,6 +59,8 @@ enum Command {
     Copy(copy::Args),
     Simulate(simulate::Args),
     Measure(measure::Args),
+    Graph(graph::Args),
+    Track(track::Args),
     Stats(stats::Args),
     Evaluate(evaluate::Args),
     Plot(plot::Args),
@@ -96,6 +101,8 @@ pub fn main() -> ExitCode {
         Command::Simulate(args) => simulate::run(args, &mut stdout),
         Command::Measure(args) => measure::run(args, &mut stdout),
         Command::Evaluate(args) => evaluate::run(args, &mut stdout),
+        Command::Graph(args) => graph::run(args, &mut stdout),
+        Command::Track(args) => track::run(args, &mut stdout),
         Command::Plot(args) => plot::run(args, &mut stdout),
         Command::Stats(args) => stats::run(args, &mut stdout),
         Command::Schema(args) => schema::run(args, &mut stdout),

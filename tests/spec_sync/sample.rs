@@ -14,6 +14,8 @@ macro_rules! every_table {
             structural_groups: StructuralGroup,
             map_points: MapPoint,
             map_lines: MapLine,
+            tracking: TrackedFrame,
+            iterations: Iteration,
             point_correspondences: PointCorrespondence,
             line_correspondences: LineCorrespondence,
             graph_poses: GraphPose,
@@ -131,6 +133,26 @@ pub(crate) fn sample() -> Sequence {
         },
     ];
     let estimate = registry::MAP_TO_FRAME.to_owned();
+    sequence.tracking = vec![TrackedFrame {
+        estimate: estimate.clone(),
+        frame_id: first,
+        state: registry::TRACKED.to_owned(),
+        points: 3,
+        lines: 1,
+        point_inliers: 2,
+        line_inliers: 1,
+        residual_rms: Some(0.75),
+    }];
+    sequence.iterations = vec![Iteration {
+        estimate: estimate.clone(),
+        iteration: 0,
+        cost: 12.5,
+        cost_change: None,
+        gradient_max: 3.0,
+        step_norm: None,
+        damping: 1e4,
+        accepted: true,
+    }];
     sequence.map_points = vec![MapPoint {
         estimate: estimate.clone(),
         point_id: point,

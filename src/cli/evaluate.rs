@@ -198,15 +198,13 @@ fn complaints(rows: &[Evaluated]) -> anyhow::Result<Outcome> {
         let found = &row.evaluation;
         // A map without a path has no errors of a path.
         let map_alone = found.matched + found.extra == 0 && (found.points.is_some() || found.lines.is_some());
-        let error = match (&found.absolute, &found.relative) {
-            _ if map_alone => continue,
-            (Err(error), _) => {
-                failed += 1;
-                error
-            }
-            (_, Err(error)) => error,
-            _ => continue,
-        };
+        if map_alone {
+            continue;
+        }
+        let Some(error) = found.absolute.as_ref().err().or(found.relative.as_ref().err()) else { continue };
+        if found.absolute.is_err() && found.relative.is_err() {
+            failed += 1;
+        }
         writeln!(stderr, "warning: {}, {}: {error}", row.sequence, found.name)?;
         outcome = Outcome::Findings;
     }

@@ -290,6 +290,15 @@ fn files_of_all_formats_meet_each_other() {
     assert!(stderr(&output).contains("found none among 11"), "{}", stderr(&output));
     let found = rows(&[&far[..], &["--t_offset", "-0.004", "--json"]].concat());
     assert_eq!(found[0]["poses_matched"], 5);
+    // On a line no rotation can be found, but what moved by how much can.
+    let straight: String = (0..5).map(|x| format!("{x} {x} 0 0 0 0 0 1\n")).collect();
+    let straight = write("straight.txt", straight);
+    let output = os(&["evaluate", "--files", text(&straight), text(&straight), "-a", "--json"]);
+    assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
+    assert!(stderr(&output).contains("alignment needs positions"), "{}", stderr(&output));
+    let row: Value = serde_json::from_str(&stdout(&output)).unwrap();
+    assert!(row["ape_translation_rmse_m"].is_null());
+    assert_eq!(row["rpe_translation_rmse_m"], 0.0);
     for (arguments, expected) in [
         (vec![text(&reference), text(&plain)], "stamps in both files"),
         (vec![text(&reference), "/nowhere"], "No such file"),

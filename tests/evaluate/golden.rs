@@ -69,8 +69,8 @@ impl Golden {
     }
 }
 
-/// Relative difference of two figures; evo takes angles from matrices, which near zero and half a turn costs it half the digits.
-const ROUNDING: f64 = 1e-7;
+/// Relative difference of two figures: rounding of sums over sixty poses, angles up to half a turn among them.
+const ROUNDING: f64 = 1e-11;
 
 #[test]
 fn all_relations_alignments_and_pairs_are_those_of_evo() {

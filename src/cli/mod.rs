@@ -7,6 +7,10 @@ mod chart;
 mod completions;
 mod convert;
 mod copy;
+mod evaluate;
+mod evaluate_files;
+mod evaluate_output;
+mod evaluate_shown;
 mod explain;
 mod extended;
 mod fetch;
@@ -62,6 +66,7 @@ enum Command {
     Track(track::Args),
     Adjust(adjust::Args),
     Stats(stats::Args),
+    Evaluate(evaluate::Args),
     Plot(plot::Args),
     Schema(schema::Args),
     Fetch(fetch::Args),
@@ -99,6 +104,7 @@ pub fn main() -> ExitCode {
         Command::Copy(args) => copy::run(args, &mut stdout),
         Command::Simulate(args) => simulate::run(args, &mut stdout),
         Command::Measure(args) => measure::run(args, &mut stdout),
+        Command::Evaluate(args) => evaluate::run(args, &mut stdout),
         Command::Graph(args) => graph::run(args, &mut stdout),
         Command::Track(args) => track::run(args, &mut stdout),
         Command::Benchmark(args) => benchmark::run(args, &mut stdout),

@@ -5,6 +5,7 @@ pub mod archive;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod datasets;
+pub mod exchange;
 #[cfg(feature = "fetch")]
 pub mod fetch;
 pub mod format;

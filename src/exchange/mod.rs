@@ -1,0 +1,18 @@
+//! Graphs, models and paths in the formats of other programs, both ways: g2o, BAL, COLMAP, text, CSV.
+//!
+//! Each format has its nouns in memory, which keep every digit of a file, and two functions between them and ours. What
+//! the other side cannot say is told in [`Remark`]s, never dropped in silence.
+
+mod bal;
+mod error;
+mod g2o;
+mod imported;
+mod lines;
+mod remark;
+
+pub use bal::{BalCamera, BalObservation, BalProblem, from_bal, read_bal, to_bal, write_bal};
+pub use error::Error;
+pub use g2o::{G2oElement, G2oForm, G2oGraph, G2oKind, from_g2o, read_g2o, to_g2o, write_g2o};
+pub use imported::{ImportNames, Imported};
+pub use lines::{LARGEST_FILE_BYTES, MOST_ELEMENTS};
+pub use remark::Remark;

@@ -58,11 +58,7 @@ impl Error {
     }
 
     /// Something for which the other side has no place.
-    pub(super) fn unfit(
-        what: impl Into<String>,
-        expected: impl Into<String>,
-        found: impl ToString,
-    ) -> Self {
+    pub(super) fn unfit(what: impl Into<String>, expected: impl Into<String>, found: impl ToString) -> Self {
         Self::Unfit { what: what.into(), expected: expected.into(), found: cut(found.to_string()) }
     }
 }

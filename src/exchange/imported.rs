@@ -164,10 +164,8 @@ impl Draft {
             ..Sequence::default()
         };
         let twice = measurements(&mut sequence);
-        self.remarks.lost(
-            twice,
-            "measurements of a point that the frame shows already; they are in the graph alone",
-        );
+        self.remarks
+            .lost(twice, "measurements of a point that the frame shows already; they are in the graph alone");
         if self.has_pixels {
             sequence.point_correspondences = point_correspondences(&sequence.point_measurements, &[]);
             sequence.frame_statistics = frame_statistics(&sequence);

@@ -38,8 +38,7 @@ impl<R: BufRead> Lines<R> {
     /// A line or a file that is too long, and bytes that are not UTF-8.
     pub(super) fn any(&mut self) -> Result<Option<&str>, Error> {
         self.buffer.clear();
-        let length =
-            self.input.by_ref().take(LONGEST_LINE_BYTES).read_until(b'\n', &mut self.buffer)? as u64;
+        let length = self.input.by_ref().take(LONGEST_LINE_BYTES).read_until(b'\n', &mut self.buffer)? as u64;
         if length == 0 {
             return Ok(None);
         }

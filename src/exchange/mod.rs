@@ -4,6 +4,7 @@
 //! the other side cannot say is told in [`Remark`]s, never dropped in silence.
 
 mod bal;
+mod colmap;
 mod error;
 mod g2o;
 mod imported;
@@ -11,6 +12,10 @@ mod lines;
 mod remark;
 
 pub use bal::{BalCamera, BalObservation, BalProblem, from_bal, read_bal, to_bal, write_bal};
+pub use colmap::{
+    ColmapCamera, ColmapImage, ColmapModel, ColmapPoint, ColmapPoint2, from_colmap, read_colmap, to_colmap,
+    write_colmap,
+};
 pub use error::Error;
 pub use g2o::{G2oElement, G2oForm, G2oGraph, G2oKind, from_g2o, read_g2o, to_g2o, write_g2o};
 pub use imported::{ImportNames, Imported};

@@ -38,8 +38,10 @@ pub fn to_bal(graph: &FactorGraph) -> Result<(BalProblem, Vec<Remark>), Error> {
             let found = format!("{:?} and {:?}", camera.fx, camera.fy);
             return Err(Error::unfit(what(), "focal lengths fx above 0 and fy not 0", found));
         }
-        let world_from_camera =
-            row.world_from_camera().pose().map_err(|error| Error::unfit(what(), "a rigid transform", error))?;
+        let world_from_camera = row
+            .world_from_camera()
+            .pose()
+            .map_err(|error| Error::unfit(what(), "a rigid transform", error))?;
         let camera_from_world = half_turn() * world_from_camera.inverse();
         let turn = Pose::new(camera_from_world.rotation(), Vector3::zeros()).log();
         camera_places.insert(row.frame_id, problem.cameras.len());

@@ -42,7 +42,9 @@ pub fn from_bal(problem: &BalProblem, names: &ImportNames) -> Result<Imported, E
         *most = [most[0].max(x.abs()), most[1].max(y.abs())];
         seen.push((observation, flat, [x, y]));
     }
-    draft.remarks.lost(unseen, "observations are left out: no ray of their camera's lens leads to their pixel");
+    draft
+        .remarks
+        .lost(unseen, "observations are left out: no ray of their camera's lens leads to their pixel");
     for (place, camera) in problem.cameras.iter().enumerate() {
         let what = || format!("camera {place}");
         if camera.focal.is_nan() || camera.focal <= 0.0 {

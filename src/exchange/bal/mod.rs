@@ -12,9 +12,9 @@ mod export;
 mod import;
 mod problem;
 mod radial;
-mod text;
 #[cfg(test)]
 mod tests;
+mod text;
 
 pub use export::to_bal;
 pub use import::from_bal;

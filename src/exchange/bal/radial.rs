@@ -62,7 +62,11 @@ impl Radial {
             if error == 0.0 {
                 break;
             }
-            if error < 0.0 { low = radius } else { high = radius }
+            if error < 0.0 {
+                low = radius
+            } else {
+                high = radius
+            }
             let squared = radius * radius;
             let newton = radius - error / (1.0 + squared * (3.0 * k1 + squared * 5.0 * k2));
             let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };

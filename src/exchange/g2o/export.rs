@@ -7,7 +7,9 @@ use super::information;
 use crate::exchange::remark::Remarks;
 use crate::exchange::{Error, Remark};
 use crate::geometry::Pose;
-use crate::structure::{Camera, CameraId, FactorGraph, FrameId, GraphFactor, MeasurementNoise, PoseRow, registry};
+use crate::structure::{
+    Camera, CameraId, FactorGraph, FrameId, GraphFactor, MeasurementNoise, PoseRow, registry,
+};
 
 /// How poses are written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -92,8 +94,11 @@ pub fn to_g2o(graph: &FactorGraph, form: G2oForm) -> Result<(G2oGraph, Vec<Remar
         if export.point_offset > 0 { graph.points.len() } else { 0 },
         format!("points got ids larger by {}, for frames have theirs", export.point_offset),
     );
-    let model =
-        G2oGraph { elements: export.elements, point_offset: export.point_offset, passed_over: BTreeMap::new() };
+    let model = G2oGraph {
+        elements: export.elements,
+        point_offset: export.point_offset,
+        passed_over: BTreeMap::new(),
+    };
     Ok((model, remarks.into_vec()))
 }
 

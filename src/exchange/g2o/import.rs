@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::element::{G2oElement, G2oGraph, G2oKind};
 use super::information;
-use crate::exchange::imported::{Draft, ImportNames, Imported};
 use crate::exchange::Error;
+use crate::exchange::imported::{Draft, ImportNames, Imported};
 use crate::geometry::PinholeCamera;
 use crate::structure::{Camera, CameraId, FrameId, GraphFactor, PointId, PoseRow, registry};
 
@@ -28,7 +28,10 @@ pub fn from_g2o(graph: &G2oGraph, names: &ImportNames) -> Result<Imported, Error
         point_offset: 0,
     };
     for (tag, count) in &graph.passed_over {
-        import.draft.remarks.lost(*count, format!("lines `{tag}` were passed over: not known, or nothing here says it"));
+        import
+            .draft
+            .remarks
+            .lost(*count, format!("lines `{tag}` were passed over: not known, or nothing here says it"));
     }
     let fixed: BTreeSet<i64> = graph
         .elements
@@ -45,7 +48,11 @@ pub fn from_g2o(graph: &G2oGraph, names: &ImportNames) -> Result<Imported, Error
     }
     let unknown = fixed.iter().filter(|id| !import.vertices.contains_key(*id)).count();
     import.draft.remarks.lost(unknown, "vertices that FIX names are not there");
-    let points_fixed = import.vertices.iter().filter(|(id, element)| element.kind == G2oKind::VertexPoint && fixed.contains(*id)).count();
+    let points_fixed = import
+        .vertices
+        .iter()
+        .filter(|(id, element)| element.kind == G2oKind::VertexPoint && fixed.contains(*id))
+        .count();
     import.draft.remarks.lost(points_fixed, "points that FIX holds are free here: a graph holds poses alone");
     for element in &graph.elements {
         import.edge(element)?;
@@ -67,7 +74,8 @@ impl<'a> Import<'a> {
     /// Remembers a vertex or a parameter under its id.
     fn vertex(&mut self, element: &'a G2oElement) -> Result<(), Error> {
         use G2oKind::{
-            CameraCalibration, CameraParameters, Offset, VertexCam, VertexExpmap, VertexPoint, VertexSe2, VertexSe3,
+            CameraCalibration, CameraParameters, Offset, VertexCam, VertexExpmap, VertexPoint, VertexSe2,
+            VertexSe3,
         };
         let (word, known) = match element.kind {
             Offset | CameraParameters | CameraCalibration => ("parameter", &mut self.parameters),
@@ -87,7 +95,7 @@ impl<'a> Import<'a> {
                 self.draft.add_point(point.0, [*x, *y, *z]);
             }
             (G2oKind::VertexSe2, [x, y, theta]) => self.draft.add_pose(id, fixed, lifted(*x, *y, *theta))?,
-            (_, [pose @ .., ]) => {
+            (_, [pose @ ..]) => {
                 self.draft.add_pose(id, fixed, pose_row(pose))?;
                 if let [_, _, _, _, _, _, _, fx, fy, cx, cy, _] = element.numbers.as_slice() {
                     self.camera(FrameId(id), [*fx, *fy, *cx, *cy])?;
@@ -98,7 +106,10 @@ impl<'a> Import<'a> {
     }
 
     fn edge(&mut self, element: &G2oElement) -> Result<(), Error> {
-        use G2oKind::{EdgeDepth, EdgeP2mc, EdgeSe2, EdgeSe3, EdgeXyz2uv, VertexCam, VertexExpmap, VertexPoint, VertexSe2, VertexSe3};
+        use G2oKind::{
+            EdgeDepth, EdgeP2mc, EdgeSe2, EdgeSe3, EdgeXyz2uv, VertexCam, VertexExpmap, VertexPoint,
+            VertexSe2, VertexSe3,
+        };
         let (ids, numbers) = (element.ids.as_slice(), element.numbers.as_slice());
         match (element.kind, ids, numbers) {
             (EdgeSe2, [from, to], [x, y, theta, weights @ ..]) => {
@@ -213,15 +224,21 @@ impl<'a> Import<'a> {
         if id == next {
             if fx <= 0.0 || fy == 0.0 {
                 let expected = "focal lengths fx above 0 and fy not 0";
-                return Err(Error::unfit(format!("camera of {frame}"), expected, format!("{fx:?} and {fy:?}")));
+                return Err(Error::unfit(
+                    format!("camera of {frame}"),
+                    expected,
+                    format!("{fx:?} and {fy:?}"),
+                ));
             }
             let pinhole = PinholeCamera { fx, fy, cx, cy, width: 1, height: 1 };
             self.draft.cameras.push(Camera::pinhole(id, &pinhole, registry::PIXEL_CENTER));
         }
         match self.draft.camera_of_frame.insert(frame, id) {
-            Some(other) if other != id => {
-                Err(Error::unfit(frame.to_string(), "one camera for each pose", "two of different intrinsics"))
-            }
+            Some(other) if other != id => Err(Error::unfit(
+                frame.to_string(),
+                "one camera for each pose",
+                "two of different intrinsics",
+            )),
             _ => Ok(()),
         }
     }

@@ -63,7 +63,8 @@ pub(super) fn from_space(measured: &Pose, information: &[f64]) -> Vec<f64> {
 /// The inverse of [`from_space`].
 pub(super) fn to_space(measured: &Pose, information: &[f64]) -> Vec<f64> {
     // (P Ad(Z⁻¹))⁻¹ = Ad(Z) P⁻¹, and P⁻¹ is a permutation as P is.
-    let inverse = adjoint(measured) * to_error(0.5).transpose().map(|entry| if entry == 0.5 { 2.0 } else { entry });
+    let inverse =
+        adjoint(measured) * to_error(0.5).transpose().map(|entry| if entry == 0.5 { 2.0 } else { entry });
     upper(&(inverse.transpose() * symmetric::<6>(information) * inverse))
 }
 

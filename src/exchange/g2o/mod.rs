@@ -17,9 +17,9 @@ mod element;
 mod export;
 mod import;
 mod information;
-mod text;
 #[cfg(test)]
 mod tests;
+mod text;
 
 pub use element::{G2oElement, G2oGraph, G2oKind};
 pub use export::{G2oForm, to_g2o};

@@ -52,7 +52,9 @@ pub fn read_g2o(input: impl BufRead) -> Result<G2oGraph, Error> {
                 element.ids.push(fields.id("an id")?);
                 while let Some(word) = fields.word_or_end() {
                     let id = word.parse().ok().filter(|id: &i64| *id >= 0);
-                    element.ids.push(id.ok_or_else(|| fields.wrong("an id, an integer of at least 0", word))?);
+                    element
+                        .ids
+                        .push(id.ok_or_else(|| fields.wrong("an id, an integer of at least 0", word))?);
                 }
             }
         }

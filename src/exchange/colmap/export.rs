@@ -126,10 +126,10 @@ pub fn to_colmap(graph: &FactorGraph) -> Result<(ColmapModel, Vec<Remark>), Erro
             errors[place].1 += 1;
         }
         let half = to_corner(camera);
-        let points = &mut model.images[image].points;
+        let image = &mut model.images[image];
         let point = &mut model.points[place];
-        point.track.push((model.images[image].id, points.len()));
-        points.push(ColmapPoint2 { pixel: [u + half, v + half], point: Some(point.id) });
+        point.track.push((image.id, image.points.len()));
+        image.points.push(ColmapPoint2 { pixel: [u + half, v + half], point: Some(point.id) });
         seen += 1;
         remarks.lost(usize::from(!rest.is_empty()), "depths are left out: a model has pixels alone");
         remarks.lost(

@@ -1,5 +1,5 @@
 use super::element::LAYOUTS;
-use super::information::{from_plane, from_space, symmetric, to_plane, to_space};
+use super::information::{from_plane, from_space, symmetric, to_plane, to_space, upper};
 use super::*;
 use crate::exchange::{Error, ImportNames};
 use crate::geometry::Pose;
@@ -43,7 +43,7 @@ fn information<const N: usize>() -> impl Strategy<Value = Vec<f64>> {
     prop::collection::vec(-1.0..1.0_f64, N * N).prop_map(|numbers| {
         let root = nalgebra::SMatrix::<f64, N, N>::from_iterator(numbers);
         let matrix = root.transpose() * root + nalgebra::SMatrix::<f64, N, N>::identity() * 0.01;
-        super::information::upper(&matrix)
+        upper(&matrix)
     })
 }
 

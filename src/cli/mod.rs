@@ -6,8 +6,11 @@ mod completions;
 mod convert;
 mod copy;
 mod explain;
+mod export;
 mod fetch;
 mod fetch_progress;
+mod import;
+mod import_trajectory;
 mod info;
 mod left_behind;
 mod man;
@@ -55,6 +58,9 @@ enum Command {
     Stats(stats::Args),
     Plot(plot::Args),
     Schema(schema::Args),
+    Export(export::Args),
+    Import(import::Args),
+    ImportTrajectory(import_trajectory::Args),
     Fetch(fetch::Args),
     Convert(convert::Args),
     Completions(completions::Args),
@@ -93,6 +99,9 @@ pub fn main() -> ExitCode {
         Command::Plot(args) => plot::run(args, &mut stdout),
         Command::Stats(args) => stats::run(args, &mut stdout),
         Command::Schema(args) => schema::run(args, &mut stdout),
+        Command::Export(args) => export::run(args, &mut stdout),
+        Command::Import(args) => import::run(args, &mut stdout),
+        Command::ImportTrajectory(args) => import_trajectory::run(args, &mut stdout),
         Command::Fetch(args) => fetch::run(args, &mut stdout),
         Command::Convert(args) => convert::run(args),
         Command::Completions(args) => completions::run(args, &mut stdout),

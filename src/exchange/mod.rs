@@ -14,6 +14,7 @@ mod remark;
 mod text_file;
 mod text_release;
 mod trajectory;
+mod valued;
 
 pub use bal::{BalCamera, BalObservation, BalProblem, from_bal, read_bal, to_bal, write_bal};
 pub use colmap::{
@@ -29,3 +30,4 @@ pub use remark::Remark;
 pub use text_file::TextFile;
 pub use text_release::to_text_release;
 pub use trajectory::{MatchBy, MatchOptions, Matched, match_trajectory, trajectory_of};
+pub use valued::valued_graph;

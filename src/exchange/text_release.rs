@@ -7,7 +7,7 @@ use super::remark::Remarks;
 use super::text_file::{TextFile, check_finite};
 use super::{Error, Remark};
 use crate::structure::{
-    FactorGraph, LineMeasurement, PointMeasurement, PoseRow, Sequence, TrajectoryPose, registry,
+    FactorGraph, GraphFactor, LineMeasurement, PointMeasurement, PoseRow, Sequence, TrajectoryPose, registry,
 };
 
 /// The clock of the release, which has no time stamps, hertz.
@@ -259,7 +259,7 @@ impl Export<'_> {
         }
     }
 
-    fn factor(&mut self, factor: &crate::structure::GraphFactor, text: &mut String) -> Result<(), Error> {
+    fn factor(&mut self, factor: &GraphFactor, text: &mut String) -> Result<(), Error> {
         let frame = factor.frame_id.map(|id| id.0);
         match (factor.kind.as_str(), frame, factor.measurement.as_slice()) {
             (registry::POINT_REPROJECTION, Some(frame), [u, v, rest @ ..]) if factor.point_id.is_some() => {

@@ -6,7 +6,7 @@ use super::element::{G2oElement, G2oGraph, G2oKind};
 use super::information;
 use crate::exchange::Error;
 use crate::exchange::imported::{Draft, ImportNames, Imported};
-use crate::geometry::PinholeCamera;
+use crate::geometry::{PinholeCamera, Pose};
 use crate::structure::{Camera, CameraId, FrameId, GraphFactor, PointId, PoseRow, registry};
 
 /// A g2o graph as a sequence: a frame for each pose, a point for each point, a factor for each edge.
@@ -176,7 +176,7 @@ impl<'a> Import<'a> {
         &mut self,
         [from, to]: [i64; 2],
         measured: PoseRow,
-        information: impl Fn(&crate::geometry::Pose) -> Vec<f64>,
+        information: impl Fn(&Pose) -> Vec<f64>,
     ) -> Result<(), Error> {
         let what = || format!("edge from {from} to {to}");
         if from == to {

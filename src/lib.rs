@@ -1,10 +1,13 @@
 //! Measurements instead of images: the Open-Structure format, its validator and its tools.
 
+pub mod adjust;
 #[cfg(feature = "archive")]
 pub mod archive;
 #[cfg(feature = "cli")]
 pub mod cli;
+pub mod covisibility;
 pub mod datasets;
+pub mod evaluate;
 pub mod exchange;
 #[cfg(feature = "fetch")]
 pub mod fetch;
@@ -14,6 +17,7 @@ pub mod plot;
 pub mod simulate;
 pub mod statistics;
 pub mod structure;
+pub mod track;
 mod unfinished;
 pub mod validate;
 

@@ -112,6 +112,7 @@ fn observed() -> Sequence {
                 end_x: segment.end.x,
                 end_y: segment.end.y,
                 end_z: segment.end.z,
+                covariance: None,
             });
         }
     }

@@ -18,7 +18,7 @@ use crate::simulate::noise::{NoiseModel, NoiseRecipe};
 use crate::structure::{
     FrameBundle, GraphFactor, GraphLine, GraphPoint, GraphPose, LineLandmark, LineMeasurement,
     LineObservation, Manifest, MapLine, MapPoint, PointLandmark, PointMeasurement, PointObservation, Record,
-    StructuralGroup, TrajectoryPose, registry,
+    Recovery, StructuralGroup, TrajectoryPose, registry,
 };
 
 /// Most realisations at once: each has a file open for every table, and rows that wait.
@@ -42,7 +42,8 @@ const CHUNK_ROWS: usize = 1 << 16;
 Examples:
   os measure box1 -o noisy.mcap --noise gaussian --seed 7 --set sigma_px=0.5
   os measure box1.mcap -o kinect/ --noise kinect-disparity --quantise 1 --outliers 0.05
-  os measure box1.mcap -o runs/box1.mcap --noise paper --seeds 0..9")]
+  os measure box1.mcap -o runs/box1.mcap --noise paper --seeds 0..9
+  os measure box1 -o with-depth/box1 --complete-depths --noise first-release --seed 3")]
 #[expect(clippy::struct_excessive_bools, reason = "each is a flag of the command line")]
 pub(super) struct Args {
     /// Sequence with observations: an MCAP file or a Parquet folder.
@@ -80,6 +81,12 @@ pub(super) struct Args {
     /// Keep trajectories, maps and graphs, which were made from other measurements.
     #[arg(long)]
     keep_estimates: bool,
+    /// Keep the measurements that are there, and give those without depth one, drawn about the true depth.
+    ///
+    /// The first release publishes the points of its simulated sequences as noisy pixels without depth, though its own
+    /// tracker had depth. The noise of depth is the model's; landmarks and true poses have to be there.
+    #[arg(long, conflicts_with_all = ["outliers", "missed", "quantise", "drop_outside", "keep_depth"])]
+    complete_depths: bool,
     /// Replace the output if it exists.
     #[arg(long)]
     force: bool,
@@ -149,6 +156,9 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     let reader = format::open(&args.sequence)?;
     let outputs = args.outputs();
     check_outputs(&outputs, args)?;
+    if args.complete_depths {
+        return complete_depths(args, &recipe, &outputs, stdout);
+    }
     let frames = reader.frame_list()?;
     for frame in frames {
         if reader.manifest().camera(frame.camera_id).is_none() {
@@ -196,6 +206,79 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         )?;
     }
     Ok(outcome)
+}
+
+/// Gives measurements without depth one, seed by seed.
+fn complete_depths(
+    args: &Args,
+    recipe: &NoiseRecipe,
+    outputs: &[(u64, PathBuf)],
+    stdout: &mut dyn Write,
+) -> anyhow::Result<Outcome> {
+    let mut outcome = Outcome::Done;
+    let input = format::read(&args.sequence)?;
+    if input.point_measurements.is_empty() && input.line_measurements.is_empty() {
+        anyhow::bail!("{}: has no measurements whose depth could be completed", args.sequence.display());
+    }
+    if !args.keep_estimates {
+        tell_dropped(&format::open(&args.sequence)?)?;
+    }
+    for (seed, path) in outputs {
+        let mut sequence = input.clone();
+        let done = recipe.complete_depths(&mut sequence, *seed);
+        sequence.manifest = manifest(&input.manifest, recipe, *seed, args.keep_estimates);
+        // Pixels stay as they were measured, and so does what was declared of them.
+        if let Some(noise) = input.manifest.noise.as_ref().filter(|noise| noise.model == recipe.model.name())
+        {
+            sequence.manifest.noise = Some(noise.clone());
+        }
+        sequence.manifest.recovered.clone_from(&input.manifest.recovered);
+        for (table, rows) in [("point_measurements", done.points), ("line_measurements", done.line_ends)] {
+            if rows > 0 {
+                sequence.manifest.recovered.push(completed(table, rows));
+            }
+        }
+        if !args.keep_estimates {
+            sequence.trajectories.clear();
+            sequence.map_points.clear();
+            sequence.map_lines.retain(|row| row.estimate == registry::UNREFINED);
+            sequence.tracking.clear();
+            sequence.iterations.clear();
+            sequence.graph_poses.clear();
+            sequence.graph_points.clear();
+            sequence.graph_lines.clear();
+            sequence.graph_factors.clear();
+        }
+        format::write(path, &sequence, WriteOptions { force: args.force, ..WriteOptions::default() })?;
+        writeln!(
+            stdout,
+            "{}: depths of {} points and {} ends of lines drawn; {} points triangulated, {} measurements without depth, {}",
+            path.display(),
+            text::count(done.points as u64),
+            text::count(done.line_ends as u64),
+            text::count(done.triangulated as u64),
+            text::count(done.without as u64),
+            text::bytes(text::size_on_disk(path))
+        )?;
+        if done.without > 0 {
+            outcome = Outcome::Findings;
+        }
+    }
+    Ok(outcome)
+}
+
+/// What a manifest says about depths that were drawn.
+fn completed(table: &str, rows: usize) -> Recovery {
+    let columns =
+        if table == PointMeasurement::TABLE.name { &["depth"][..] } else { &["start_depth", "end_depth"] };
+    let columns = columns.iter().map(|column| (*column).to_owned()).collect();
+    Recovery {
+        table: table.to_owned(),
+        columns,
+        rows: rows as u64,
+        method: "drawn about the depth of the landmark in the true camera, by the noise model".to_owned(),
+        ids: Vec::new(),
+    }
 }
 
 /// Refuses what could not be written in the end, before any work.

@@ -7,8 +7,10 @@ mod convert;
 mod copy;
 mod explain;
 mod export;
+mod extended;
 mod fetch;
 mod fetch_progress;
+mod graph;
 mod import;
 mod import_trajectory;
 mod info;
@@ -22,6 +24,7 @@ mod schema;
 mod simulate;
 mod stats;
 mod text;
+mod track;
 mod validate;
 
 use std::io::{self, IsTerminal, Write};
@@ -55,6 +58,8 @@ enum Command {
     Copy(copy::Args),
     Simulate(simulate::Args),
     Measure(measure::Args),
+    Graph(graph::Args),
+    Track(track::Args),
     Stats(stats::Args),
     Plot(plot::Args),
     Schema(schema::Args),
@@ -96,6 +101,8 @@ pub fn main() -> ExitCode {
         Command::Copy(args) => copy::run(args, &mut stdout),
         Command::Simulate(args) => simulate::run(args, &mut stdout),
         Command::Measure(args) => measure::run(args, &mut stdout),
+        Command::Graph(args) => graph::run(args, &mut stdout),
+        Command::Track(args) => track::run(args, &mut stdout),
         Command::Plot(args) => plot::run(args, &mut stdout),
         Command::Stats(args) => stats::run(args, &mut stdout),
         Command::Schema(args) => schema::run(args, &mut stdout),

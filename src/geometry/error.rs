@@ -42,6 +42,24 @@ pub enum Error {
         /// `n · d` in metres, for a direction of length one.
         found: f64,
     },
+    /// Fewer measurements than unknowns.
+    #[error("{what}: expected at least {expected}, found {found}")]
+    TooFew {
+        /// What is sought from them.
+        what: &'static str,
+        /// How many it takes.
+        expected: usize,
+        /// How many there are.
+        found: usize,
+    },
+    /// Measurements whose arrangement leaves the answer open, such as points on one line, or that no answer fits.
+    #[error("{what}: {reason}")]
+    Degenerate {
+        /// What is sought.
+        what: &'static str,
+        /// What leaves it open.
+        reason: &'static str,
+    },
     /// A line that passes through the camera centre, or lies in the plane through it parallel to the image.
     #[error(
         "line has no image: its plane through the camera centre has the normal {moment:?} m in the camera"

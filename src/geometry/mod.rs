@@ -22,16 +22,23 @@
 //! # Ok::<(), open_structure::geometry::Error>(())
 //! ```
 
+mod absolute_orientation;
 mod camera;
 mod direction;
+mod epnp;
 mod error;
+mod landmark_match;
 mod least_squares;
 mod line_fit;
 mod line_residual;
 mod orthonormal_line;
+mod p3p;
 mod parallax;
 mod plucker_line;
 mod pose;
+mod pose_ransac;
+mod pose_refinement;
+mod robust_loss;
 mod rotation;
 mod segment;
 #[cfg(test)]
@@ -41,12 +48,18 @@ mod triangulate_point;
 
 pub use camera::PinholeCamera;
 pub use direction::angle as angle_between;
+pub use epnp::epnp;
 pub use error::Error;
+pub use landmark_match::{LineMatch, MeasuredDepth, PointMatch, Residual};
 pub use line_fit::{LineFit, fit_line};
 pub use line_residual::line_residual;
 pub use orthonormal_line::OrthonormalLine;
+pub use p3p::p3p;
 pub use plucker_line::PluckerLine;
 pub use pose::Pose;
+pub use pose_ransac::{PoseConsensus, RansacOptions, ransac_pose};
+pub use pose_refinement::{PoseRefinement, refine_pose};
+pub use robust_loss::RobustLoss;
 pub use segment::Segment;
 pub use triangulate_line::{LineTriangulation, LineView, triangulate_line};
 pub use triangulate_point::{PointView, Triangulation, triangulate_point};

@@ -3,7 +3,7 @@
 use super::Error;
 use super::direction::UNIT_TOLERANCE;
 use super::rotation::{SMALL_ANGLE, rotation_exp, rotation_log};
-use nalgebra::{Matrix3, Point3, Quaternion, UnitQuaternion, Vector3, Vector4, Vector6};
+use nalgebra::{Matrix3, Matrix6, Point3, Quaternion, UnitQuaternion, Vector3, Vector4, Vector6};
 use std::ops::Mul;
 
 /// A quaternion shorter than this names no rotation: its direction would be noise.
@@ -148,6 +148,23 @@ impl Pose {
         Vector6::new(turn.x, turn.y, turn.z, shift.x, shift.y, shift.z)
     }
 
+    /// The adjoint: takes a tangent of the space on the right to the one on the left, `self · Exp(ξ) = Exp(Ad ξ) · self`.
+    ///
+    /// ```text
+    ///       ⎡   R     0 ⎤
+    /// Ad =  ⎢           ⎥    over [rotation; translation]
+    ///       ⎣ [t]ₓR   R ⎦
+    /// ```
+    #[must_use]
+    pub fn adjoint(&self) -> Matrix6<f64> {
+        let rotation = self.rotation_matrix();
+        let mut adjoint = Matrix6::zeros();
+        adjoint.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
+        adjoint.fixed_view_mut::<3, 3>(3, 3).copy_from(&rotation);
+        adjoint.fixed_view_mut::<3, 3>(3, 0).copy_from(&(self.translation.cross_matrix() * rotation));
+        adjoint
+    }
+
     /// How far the transform turns, radians in `[0, π]`.
     #[must_use]
     pub fn rotation_angle(&self) -> f64 {
@@ -288,6 +305,11 @@ mod tests {
             let (whole, part) = (a.inverse() * b, a.inverse() * a.interpolate(&b, t));
             prop_assert!((part.rotation_angle() - t * whole.rotation_angle()).abs() < ROUNDING_M);
             prop_assert!((part.translation - whole.translation * t).norm() < ROUNDING_M);
+        }
+
+        #[test]
+        fn the_adjoint_takes_a_tangent_to_the_other_side(a in pose(), t in tangent()) {
+            prop_assert!(distance(&(a * Pose::exp(&t)), &(Pose::exp(&(a.adjoint() * t)) * a)) < 10.0 * ROUNDING_M);
         }
 
         #[test]

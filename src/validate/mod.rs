@@ -34,6 +34,7 @@ mod manifest;
 mod mix;
 mod noise;
 mod point_rows;
+mod positive;
 mod report;
 mod rules;
 mod run;

@@ -227,6 +227,12 @@ rules! {
     GraphInformationPositive: "graph-information-positive", Error, "6.14",
         "Information matrices MUST be positive semi-definite.",
         None, "1.0.0";
+    CovariancePositive: "covariance-positive", Error, "6.21",
+        "A covariance MUST have as many numbers as its column says, and be positive semi-definite.",
+        None, "1.3.0";
+    TrackingCounts: "tracking-counts", Error, "6.20",
+        "Counts of `tracking` MUST NOT be negative, and there are at most as many inliers as matches.",
+        None, "1.3.0";
     FrameStatisticsAgree: "frame-statistics-agree", Error, "6.15",
         "`frame_statistics` MUST have one row for each frame, with the numbers that its definition gives: counts exactly, angles and lengths within 1e-6 rad and m.",
         None, "1.0.0";

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Point3;
 
 use super::correspondences::{Claims, Correspondence, correspondences, hold};
-use super::estimates::{map_lines, map_points, trajectories};
+use super::estimates::{iterations, map_lines, map_points, tracking, trajectories};
 use super::finding::{Detail, Findings};
 use super::fit::Evaluation;
 use super::frame_rows::FrameCount;
@@ -41,6 +41,7 @@ struct Names {
     estimates: BTreeSet<String>,
     group_kinds: BTreeSet<String>,
     factor_kinds: BTreeSet<String>,
+    tracking_states: BTreeSet<String>,
 }
 
 /// What was learnt of the landmarks.
@@ -87,6 +88,7 @@ pub(crate) fn run(shared: &Shared<'_>, known: &Known, mut findings: Findings) ->
     open("estimate", &names.estimates, &mut findings);
     open("group kind", &names.group_kinds, &mut findings);
     open("factor kind", &names.factor_kinds, &mut findings);
+    open("tracking state", &names.tracking_states, &mut findings);
     forget(shared, frames_known, &outcomes, &mut findings);
     Tables { findings, outcomes, stamps: index.first_and_last_stamp.filter(|_| frames_known) }
 }
@@ -246,6 +248,9 @@ fn other_tables(
     outcomes.push(("trajectories", trajectories(shared, index, &mut names.estimates, findings)));
     outcomes.push(("map_points", map_points(shared, &mut names.estimates, findings)));
     outcomes.push(("map_lines", map_lines(shared, &mut names.estimates, findings)));
+    let tracked = tracking(shared, index, &mut names.estimates, &mut names.tracking_states, findings);
+    outcomes.push(("tracking", tracked));
+    outcomes.push(("iterations", iterations(shared, &mut names.estimates, findings)));
     (names, outcomes)
 }
 

@@ -178,6 +178,7 @@ fn estimate(sequence: &mut Sequence) {
             x: point.x + off,
             y: point.y,
             z: point.z,
+            covariance: (point.point_id.0 % 2 == 0).then(|| vec![1e-4, 0.0, 0.0, 1e-4, 0.0, 1e-4]),
         }));
     }
     sequence.map_lines.extend(sequence.line_landmarks.iter().map(|line| MapLine {
@@ -189,6 +190,7 @@ fn estimate(sequence: &mut Sequence) {
         end_x: line.end_x,
         end_y: line.end_y,
         end_z: line.end_z + 0.01,
+        covariance: None,
     }));
 }
 

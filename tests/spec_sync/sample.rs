@@ -14,6 +14,8 @@ macro_rules! every_table {
             structural_groups: StructuralGroup,
             map_points: MapPoint,
             map_lines: MapLine,
+            tracking: TrackedFrame,
+            iterations: Iteration,
             point_correspondences: PointCorrespondence,
             line_correspondences: LineCorrespondence,
             graph_poses: GraphPose,
@@ -131,8 +133,34 @@ pub(crate) fn sample() -> Sequence {
         },
     ];
     let estimate = registry::MAP_TO_FRAME.to_owned();
-    sequence.map_points =
-        vec![MapPoint { estimate: estimate.clone(), point_id: point, x: 1.0, y: 2.0, z: 5.0 }];
+    sequence.tracking = vec![TrackedFrame {
+        estimate: estimate.clone(),
+        frame_id: first,
+        state: registry::TRACKED.to_owned(),
+        points: 3,
+        lines: 1,
+        point_inliers: 2,
+        line_inliers: 1,
+        residual_rms: Some(0.75),
+    }];
+    sequence.iterations = vec![Iteration {
+        estimate: estimate.clone(),
+        iteration: 0,
+        cost: 12.5,
+        cost_change: None,
+        gradient_max: 3.0,
+        step_norm: None,
+        damping: 1e4,
+        accepted: true,
+    }];
+    sequence.map_points = vec![MapPoint {
+        estimate: estimate.clone(),
+        point_id: point,
+        x: 1.0,
+        y: 2.0,
+        z: 5.0,
+        covariance: None,
+    }];
     sequence.map_lines = vec![MapLine {
         estimate,
         line_id: line,
@@ -142,6 +170,7 @@ pub(crate) fn sample() -> Sequence {
         end_x: end.x,
         end_y: end.y,
         end_z: end.z,
+        covariance: None,
     }];
     sequence.point_observations = vec![
         PointObservation { frame_id: first, point_id: point, u: 419.5, v: 239.5, depth: Some(5.0) },

@@ -294,6 +294,8 @@ type Add<'a> = dyn FnMut(&str, Vec<Vec<Cell>>) -> Result<()> + 'a;
 
 fn estimates(scene: &Scene, world: &World, add: &mut Add<'_>) -> Result<()> {
     let (mut poses, mut points, mut lines) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut tracking, mut iterations) = (Vec::new(), Vec::new());
+    let absent = |covariance: Option<Cell>| covariance.unwrap_or(Cell::Null);
     for estimate in &scene.estimates {
         let mut disturbed = Disturbed {
             draw: Noise::new(estimate.seed),
@@ -301,23 +303,39 @@ fn estimates(scene: &Scene, world: &World, add: &mut Add<'_>) -> Result<()> {
             sigma_rad: estimate.sigma_rad,
         };
         let key = |id: i64| [Cell::from(estimate.name.as_str()), id.into()].into_iter();
+        let (turn, shift) = (estimate.sigma_rad.powi(2), estimate.sigma_m.powi(2));
         for (frame, placement) in scene.frames.iter().zip(&world.placements) {
-            poses.push(key(frame.frame_id).chain(cells(&disturbed.placement(placement).numbers())).collect());
+            let covariance = estimate.map.then(|| diagonal(&[turn, turn, turn, shift, shift, shift]));
+            let placed: Vec<Cell> = cells(&disturbed.placement(placement).numbers()).collect();
+            poses.push(key(frame.frame_id).chain(placed).chain([absent(covariance)]).collect());
+            if !estimate.map {
+                let words: [Cell; 6] =
+                    ["tracked".into(), 9.into(), 4.into(), 8.into(), 4.into(), Cell::from(0.9)];
+                tracking.push(key(frame.frame_id).chain(words).collect());
+            }
         }
         if estimate.map {
             for (point, at) in scene.points.iter().zip(&world.points) {
                 let at: [f64; 3] = disturbed.point(at).into();
-                points.push(key(point.point_id).chain(cells(&at)).collect());
+                let covariance = diagonal(&[shift; 3]);
+                points.push(key(point.point_id).chain(cells(&at)).chain([covariance]).collect());
             }
             for (line, segment) in scene.lines.iter().zip(&world.lines) {
                 let segment = segment.map(|end| disturbed.point(&end));
-                lines.push(key(line.line_id).chain(ends(segment)).collect());
+                lines.push(key(line.line_id).chain(ends(segment)).chain([diagonal(&[shift; 6])]).collect());
             }
+            let steps: [[Cell; 6]; 2] = [
+                [80.0.into(), Cell::Null, 900.0.into(), Cell::Null, 1e4.into(), true.into()],
+                [20.0.into(), 60.0.into(), 0.25.into(), 0.5.into(), 1e4.into(), true.into()],
+            ];
+            iterations.extend((0..).zip(steps).map(|(step, words)| key(step).chain(words).collect()));
         }
     }
     add("trajectories", poses)?;
     add("map_points", points)?;
-    add("map_lines", lines)
+    add("map_lines", lines)?;
+    add("tracking", tracking)?;
+    add("iterations", iterations)
 }
 
 /// Upper triangle, row by row, of a diagonal matrix.

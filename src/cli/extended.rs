@@ -1,0 +1,46 @@
+//! A sequence with something added: read whole, changed, written under another name.
+
+use std::path::Path;
+
+use anyhow::Context;
+
+use super::{Outcome, left_behind, text};
+use crate::format::{self, WriteOptions};
+use crate::structure::{Sequence, registry};
+
+/// A whole sequence that is to be extended, and whether something of it will be left behind.
+///
+/// Refuses an output that could not be written in the end, before any work.
+pub(super) fn read(input: &Path, output: &Path, force: bool) -> anyhow::Result<(Sequence, Outcome)> {
+    if output.symlink_metadata().is_ok() {
+        let (input, output_found) = (input.canonicalize().ok(), output.canonicalize().ok());
+        if input.zip(output_found).is_some_and(|(input, output)| input.starts_with(&output)) {
+            anyhow::bail!("{}: is the input itself, or holds it", output.display());
+        }
+        if !force {
+            return Err(format::Error::Exists { path: output.to_owned() }.into());
+        }
+    }
+    let reader = format::open(input)?;
+    let outcome = left_behind::warn(&reader)?;
+    let sequence = format::read(input).with_context(|| format!("{}: cannot be read", input.display()))?;
+    Ok((sequence, outcome))
+}
+
+/// Writes the extended sequence; gives how large it is, in words.
+pub(super) fn write(output: &Path, mut sequence: Sequence, force: bool) -> anyhow::Result<String> {
+    registry::SPEC_VERSION.clone_into(&mut sequence.manifest.spec_version);
+    sequence.manifest.tables.clear();
+    format::write(output, &sequence, WriteOptions { force, ..WriteOptions::default() })?;
+    Ok(text::bytes(text::size_on_disk(output)))
+}
+
+/// Refuses a name that is taken already, unless it is to be replaced.
+pub(super) fn check_name(kind: &str, name: &str, is_taken: bool, replace: bool) -> anyhow::Result<()> {
+    anyhow::ensure!(!name.is_empty(), "the name of the {kind} is empty");
+    anyhow::ensure!(
+        !is_taken || replace,
+        "the sequence has {kind} `{name}` already: choose another name with --name, or replace it with --replace"
+    );
+    Ok(())
+}

@@ -14,9 +14,7 @@ use super::problem::{Problem, Variable};
 use super::summary::Summary;
 use super::whitening::{depth_sight, ends_depth_sight, ends_sight, pixel_sight};
 use crate::geometry::{PluckerLine, Segment};
-use crate::structure::{
-    Estimate, FactorGraph, Iteration, MapLine, MapPoint, PoseRow, TrajectoryPose,
-};
+use crate::structure::{Estimate, FactorGraph, Iteration, MapLine, MapPoint, PoseRow, TrajectoryPose};
 use nalgebra::{Matrix6, Point3, Vector3, Vector6};
 use std::marker::PhantomData;
 use std::sync::Arc;
@@ -164,7 +162,10 @@ impl Estimation {
         summary.weak.clear();
         summary.unconstrained.clear();
         let mut numbers = vec![0; observations.frames.len()];
-        observations.point_views.iter().for_each(|view| numbers[view.frame] += 2 + usize::from(view.depth.is_some()));
+        observations
+            .point_views
+            .iter()
+            .for_each(|view| numbers[view.frame] += 2 + usize::from(view.depth.is_some()));
         observations.line_views.iter().for_each(|view| {
             numbers[view.frame] += 2 + view.depths.iter().flatten().count();
         });
@@ -230,7 +231,12 @@ impl Estimation {
     }
 
     /// Whether another round would change what is estimated.
-    pub(super) fn needs_another(&self, options: &Options, _observations: &Observations, round: usize) -> bool {
+    pub(super) fn needs_another(
+        &self,
+        options: &Options,
+        _observations: &Observations,
+        round: usize,
+    ) -> bool {
         options.method == Method::Structural && round == 0
     }
 
@@ -245,7 +251,11 @@ impl Estimation {
         let name = options.estimate_name().to_owned();
         summary.residual_rms = self.residual_rms();
         let trajectory = observations.frames.iter().map(|frame| {
-            TrajectoryPose::new(name.clone(), frame.frame_id, PoseRow::from(&frame.camera_from_world.inverse()))
+            TrajectoryPose::new(
+                name.clone(),
+                frame.frame_id,
+                PoseRow::from(&frame.camera_from_world.inverse()),
+            )
         });
         let points = observations.points.iter().map(|point| MapPoint {
             estimate: name.clone(),
@@ -310,14 +320,19 @@ fn diagonal_root(sigma_rotation_rad: f64, sigma_translation_m: f64) -> Matrix6<f
 }
 
 /// The line of a moment and a direction of any scale, directed as another is.
-pub(super) fn line_of(moment: Vector3<f64>, direction: Vector3<f64>, like: &PluckerLine) -> Option<PluckerLine> {
+pub(super) fn line_of(
+    moment: Vector3<f64>,
+    direction: Vector3<f64>,
+    like: &PluckerLine,
+) -> Option<PluckerLine> {
     let length = direction.norm();
     let sign = if direction.dot(&like.direction) < 0.0 { -1.0 } else { 1.0 };
     let direction = direction * (sign / length);
     let moment = moment * (sign / length);
     // Both come from one form, so that they are perpendicular up to rounding.
     let moment = moment - direction * direction.dot(&moment);
-    (moment.iter().chain(&direction).all(|number| number.is_finite())).then_some(PluckerLine { moment, direction })
+    (moment.iter().chain(&direction).all(|number| number.is_finite()))
+        .then_some(PluckerLine { moment, direction })
 }
 
 /// The piece of a line between the feet of a segment's ends.

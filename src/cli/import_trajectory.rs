@@ -7,11 +7,9 @@ use std::path::PathBuf;
 use anyhow::{Context, bail};
 use clap::ValueEnum;
 
-use super::export::refuse_input;
-use super::{Outcome, left_behind, text};
+use super::{Outcome, extended, text};
 use crate::exchange::{MatchBy, MatchOptions, match_trajectory};
-use crate::format::{self, WriteOptions};
-use crate::structure::{Estimate, TrajectoryFormat, read_trajectory, registry};
+use crate::structure::{Estimate, TrajectoryFormat, read_trajectory};
 
 /// Import the path that another system estimated, as an estimate of the sequence.
 ///
@@ -75,23 +73,11 @@ enum By {
 }
 
 pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome> {
-    refuse_input(&args.sequence, &args.output)?;
-    if !args.force && args.output.symlink_metadata().is_ok() {
-        return Err(format::Error::Exists { path: args.output.clone() }.into());
-    }
-    if args.name.is_empty() {
-        bail!("--name: expected a name, found none");
-    }
     if !(args.t_max_diff >= 0.0 && args.t_max_diff <= 1e9) {
         bail!("--t-max-diff: expected seconds from 0 to 1e9, found {}", args.t_max_diff);
     }
-    let reader = format::open(&args.sequence)?;
-    let mut outcome = left_behind::warn(&reader)?;
-    drop(reader);
-    let mut sequence = format::read(&args.sequence)?;
-    if !args.replace && Estimate::is_in(&sequence, &args.name) {
-        bail!("estimate `{}` is in the sequence already; use another name or --replace", args.name);
-    }
+    let (mut sequence, mut outcome) = extended::read(&args.sequence, &args.output, args.force)?;
+    extended::check_name("estimate", &args.name, Estimate::is_in(&sequence, &args.name), args.replace)?;
     let file = File::open(&args.trajectory).with_context(|| args.trajectory.display().to_string())?;
     let from = args.from.map(|from| match from {
         Format::Tum => TrajectoryFormat::Tum,
@@ -115,11 +101,8 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     let count = |number: usize| text::count(number as u64);
     let found = matched.estimate.trajectory.len();
     matched.estimate.put(&mut sequence);
-    let manifest = &mut sequence.manifest;
-    manifest.tables.clear();
-    registry::SPEC_VERSION.clone_into(&mut manifest.spec_version);
-    let options = WriteOptions { force: args.force, ..WriteOptions::default() };
-    format::write(&args.output, &sequence, options)?;
+    let frames = sequence.frames.len();
+    let size = extended::write(&args.output, sequence, args.force)?;
     let by = match matched.by {
         MatchBy::Stamp => "by stamp",
         MatchBy::FrameId => "by frame id",
@@ -135,12 +118,12 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     }
     writeln!(
         stdout,
-        "{}: estimate `{}`, {} of {} poses matched {by} with {} frames",
+        "{}: estimate `{}`, {} of {} poses matched {by} with {} frames; {size}",
         args.output.display(),
         args.name,
         count(found),
         count(rows.len()),
-        count(sequence.frames.len())
+        count(frames)
     )?;
     Ok(outcome)
 }

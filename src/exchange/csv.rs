@@ -118,3 +118,77 @@ fn push(text: &mut String, names: &[&dyn std::fmt::Display], numbers: &[Option<f
     text.push('\n');
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::structure::{
+        CameraId, Frame, FrameId, GroupId, LineId, LineMeasurement, PointId, PointMeasurement, PoseRow,
+        StructuralGroup,
+    };
+
+    fn sample() -> Sequence {
+        let pose = PoseRow { translation: [1.0, 2.0, 3.0], rotation_xyzw: [0.0, 0.0, 0.0, 1.0] };
+        Sequence {
+            frames: vec![Frame::new(FrameId(4), 1_500_000_000, CameraId(0), Some(pose))],
+            point_measurements: vec![PointMeasurement {
+                frame_id: FrameId(4),
+                point_id: PointId(9),
+                u: 0.1,
+                v: -2.5,
+                depth: None,
+            }],
+            line_measurements: vec![LineMeasurement {
+                frame_id: FrameId(4),
+                line_id: LineId(2),
+                start_u: 1.0,
+                start_v: 2.0,
+                start_depth: Some(3.0),
+                end_u: 4.0,
+                end_v: 5.0,
+                end_depth: None,
+            }],
+            structural_groups: vec![StructuralGroup {
+                group_id: GroupId(1),
+                kind: "a \"kind\"".to_owned(),
+                direction_x: Some(1.0),
+                direction_y: Some(0.0),
+                direction_z: Some(0.0),
+                line_ids: vec![LineId(2), LineId(7)],
+            }],
+            ..Sequence::default()
+        }
+    }
+
+    fn text(files: &[TextFile], name: &str) -> Option<String> {
+        files.iter().find(|file| file.name == name).map(|file| file.text.clone())
+    }
+
+    #[test]
+    fn absent_depths_are_empty_and_there_is_no_truth() {
+        let files = to_csv(&sample(), false).unwrap();
+        let told = |name| text(&files, name).unwrap();
+        assert_eq!(told("frames.csv"), "frame_id,stamp_nanos,camera_id\n4,1500000000,0\n");
+        assert_eq!(told("point_measurements.csv"), "frame_id,point_id,u,v,depth\n4,9,0.1,-2.5,\n");
+        assert!(told("line_measurements.csv").ends_with("\n4,2,1.0,2.0,3.0,4.0,5.0,\n"));
+        assert_eq!(told("structural_groups.csv"), "group_id,kind,line_ids\n1,\"a \"\"kind\"\"\",2 7\n");
+        assert_eq!(text(&files, "true_poses.csv"), None);
+        assert!(files.iter().all(|file| !file.text.contains("direction")));
+    }
+
+    #[test]
+    fn truth_comes_when_it_is_asked_for() {
+        let files = to_csv(&sample(), true).unwrap();
+        let poses = text(&files, "true_poses.csv").unwrap();
+        assert_eq!(poses, "frame_id,tx,ty,tz,qx,qy,qz,qw\n4,1.0,2.0,3.0,0.0,0.0,0.0,1.0\n");
+        assert!(text(&files, "structural_groups.csv").unwrap().ends_with(",2 7,1.0,0.0,0.0\n"));
+    }
+
+    #[test]
+    fn a_number_that_is_none_is_refused_with_its_row() {
+        let mut sequence = sample();
+        sequence.point_measurements[0].v = f64::NAN;
+        let message = to_csv(&sequence, false).unwrap_err().to_string();
+        assert_eq!(message, "4,9,0.1,: expected finite numbers, found NaN");
+    }
+}

@@ -411,3 +411,66 @@ fn adjusted(estimate: &str) -> Option<String> {
         ["ba", "point", "line"].iter().any(|end| stem.ends_with(end)) || stem.contains("linelandmark");
     (plain && !stem.is_empty() && !other).then(|| stem.to_owned())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::structure::{
+        CameraId, Frame, FrameId, GraphPose, GroupId, LineId, MapPoint, PointId, StructuralGroup,
+    };
+
+    #[test]
+    fn names_of_estimates_are_those_that_readers_make_of_the_files() {
+        assert_eq!(adjusted("point-ba").as_deref(), Some("Point"));
+        assert_eq!(adjusted("point-line-ba").as_deref(), Some("PointLine"));
+        assert_eq!(adjusted("structural-ba").as_deref(), Some("structural"));
+        for name in ["frame-to-frame", "my-own-ba", "ba", "-ba", "midpoint-ba", "Mine-ba", "ba-ba"] {
+            assert_eq!(adjusted(name), None, "{name}");
+        }
+    }
+
+    #[test]
+    fn lines_are_those_of_the_release() {
+        let pose = PoseRow { translation: [9.0, 0.0, 1.5], rotation_xyzw: [0.0, 0.0, 0.0, 1.0] };
+        let sequence = Sequence {
+            frames: vec![Frame::new(FrameId(0), 0, CameraId(0), Some(pose))],
+            graph_poses: vec![GraphPose::new("initial".to_owned(), FrameId(0), true, pose)],
+            map_points: vec![MapPoint {
+                estimate: "point-ba".to_owned(),
+                point_id: PointId(3),
+                x: 1.0,
+                y: 2.0,
+                z: -0.5,
+                covariance: None,
+            }],
+            point_measurements: vec![PointMeasurement {
+                frame_id: FrameId(0),
+                point_id: PointId(3),
+                u: 10.25,
+                v: 20.5,
+                depth: Some(2.0),
+            }],
+            structural_groups: vec![StructuralGroup {
+                group_id: GroupId(5),
+                kind: registry::PARALLEL.to_owned(),
+                line_ids: vec![LineId(1), LineId(4)],
+                ..StructuralGroup::default()
+            }],
+            ..Sequence::default()
+        };
+        let (files, remarks) = to_text_release(&sequence, None).unwrap();
+        let told = |name: &str| files.iter().find(|file| file.name == name).unwrap().text.clone();
+        let vertex = "0 9.0 0.0 1.5 0.0 0.0 0.0 1.0\n";
+        assert_eq!(told("observation/camera_poses.txt"), vertex);
+        assert!(told("baseline/venom_sequence.txt").starts_with(&format!("Vertex: {vertex}")));
+        assert_eq!(told("baseline/Point_Mappoint.txt"), "Mappoint:3 1.0 2.0 -0.5\n");
+        assert_eq!(
+            told("observation/association.txt"),
+            "MappointFrameAsso: 3 0 10.25 20.5\nParalineMaplineAsso: 5 2 1 4\n"
+        );
+        assert_eq!(remarks.len(), 1, "{remarks:?}");
+        assert!(remarks[0].loss && remarks[0].text.starts_with("depths of points"));
+        let message = to_text_release(&sequence, Some("other")).unwrap_err().to_string();
+        assert_eq!(message, "graph `other`: expected one of the sequence, found none");
+    }
+}

@@ -75,13 +75,22 @@ impl ClassicTracker {
     }
 
     /// Takes the places of everything with depth.
-    fn learn(&mut self, camera: &PinholeCamera, pose: &Pose, points: &[PointSighting], lines: &[LineSighting]) {
+    fn learn(
+        &mut self,
+        camera: &PinholeCamera,
+        pose: &Pose,
+        points: &[PointSighting],
+        lines: &[LineSighting],
+    ) {
         self.last.clear();
         for sighting in points {
             let Some(depth) = sighting.depth else { continue };
             let place = pose * camera.back_project(sighting.pixel, depth.depth_m());
             self.last.insert(sighting.id, place);
-            self.points.entry(sighting.id).and_modify(|mean| mean.add(place)).or_insert_with(|| Mean::of(place));
+            self.points
+                .entry(sighting.id)
+                .and_modify(|mean| mean.add(place))
+                .or_insert_with(|| Mean::of(place));
         }
         for sighting in lines {
             let [Some(start), Some(end)] = sighting.depths else { continue };

@@ -198,7 +198,8 @@ impl Tracker for LandmarkTracker {
                 residual_rms: None,
             });
         };
-        let (mut point_matches, mut line_matches): (Vec<PointMatch>, Vec<LineMatch>) = (Vec::new(), Vec::new());
+        let (mut point_matches, mut line_matches): (Vec<PointMatch>, Vec<LineMatch>) =
+            (Vec::new(), Vec::new());
         for (place, sighting) in points.iter().enumerate() {
             if let Some(landmark) = self.points.get(&sighting.id) {
                 seen.point_places.push(place);

@@ -53,7 +53,8 @@ impl LineLandmark {
         for (k, (point, depth)) in in_camera.iter().zip([start, end]).enumerate() {
             let sigmas = (view.sigma_px, depth.sigma_m());
             // What the pose adds is common to both ends; it is added below.
-            let of_end = back_projected(&view.camera, &view.camera_from_world, point, sigmas, &Matrix6::zeros());
+            let of_end =
+                back_projected(&view.camera, &view.camera_from_world, point, sigmas, &Matrix6::zeros());
             covariance
                 .fixed_view_mut::<2, 2>(2 * k, 2 * k)
                 .copy_from(&(across.transpose() * of_end * across));
@@ -225,7 +226,10 @@ impl PendingLine {
         }
         let covariance = inverse(&information)?;
         let distance = (last.camera_from_world * segment.midpoint()).coords.norm();
-        (covariance.trace().sqrt() < MOST_DOUBT * distance)
-            .then_some(LineLandmark { segment, covariance, contradictions: 0 })
+        (covariance.trace().sqrt() < MOST_DOUBT * distance).then_some(LineLandmark {
+            segment,
+            covariance,
+            contradictions: 0,
+        })
     }
 }

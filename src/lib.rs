@@ -9,6 +9,7 @@ pub mod cli;
 pub mod covisibility;
 pub mod datasets;
 pub mod evaluate;
+pub mod exchange;
 #[cfg(feature = "fetch")]
 pub mod fetch;
 pub mod format;

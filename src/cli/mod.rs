@@ -12,10 +12,13 @@ mod evaluate_files;
 mod evaluate_output;
 mod evaluate_shown;
 mod explain;
+mod export;
 mod extended;
 mod fetch;
 mod fetch_progress;
 mod graph;
+mod import;
+mod import_trajectory;
 mod info;
 mod left_behind;
 mod man;
@@ -69,6 +72,9 @@ enum Command {
     Evaluate(evaluate::Args),
     Plot(plot::Args),
     Schema(schema::Args),
+    Export(export::Args),
+    Import(import::Args),
+    ImportTrajectory(import_trajectory::Args),
     Fetch(fetch::Args),
     Convert(convert::Args),
     Completions(completions::Args),
@@ -112,6 +118,9 @@ pub fn main() -> ExitCode {
         Command::Plot(args) => plot::run(args, &mut stdout),
         Command::Stats(args) => stats::run(args, &mut stdout),
         Command::Schema(args) => schema::run(args, &mut stdout),
+        Command::Export(args) => export::run(args, &mut stdout),
+        Command::Import(args) => import::run(args, &mut stdout),
+        Command::ImportTrajectory(args) => import_trajectory::run(args, &mut stdout),
         Command::Fetch(args) => fetch::run(args, &mut stdout),
         Command::Convert(args) => convert::run(args),
         Command::Completions(args) => completions::run(args, &mut stdout),

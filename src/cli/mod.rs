@@ -1,7 +1,7 @@
 //! The command line: arguments in, calls to the rooms below, rendering out.
 
-mod benchmark;
 mod adjust;
+mod benchmark;
 mod cat;
 mod chart;
 mod completions;

@@ -77,27 +77,14 @@ impl ClassicTracker {
     }
 
     /// Takes the places of everything with depth.
-    fn learn(
-        &mut self,
-        camera: &PinholeCamera,
-        pose: &Pose,
-        points: &[PointSighting],
-        lines: &[LineSighting],
-    ) {
-        self.last.clear();
-        for sighting in points {
-            let Some(depth) = sighting.depth else { continue };
-            let place = pose * camera.back_project(sighting.pixel, depth.depth_m());
-            self.last.insert(sighting.id, place);
-            self.points
-                .entry(sighting.id)
-                .and_modify(|mean| mean.add(place))
-                .or_insert_with(|| Mean::of(place));
     fn learn(&mut self, camera: &PinholeCamera, pose: &Pose, points: &[PointSighting], lines: &[LineSighting]) {
         // After a predicted frame, points of the last one that was tracked stay the better known ones.
         if self.predicted == 0 {
             self.last.clear();
         }
+        for sighting in points {
+            let Some(depth) = sighting.depth else { continue };
+            let place = pose * camera.back_project(sighting.pixel, depth.depth_m());
             self.last.entry(sighting.id).or_insert(place);
             // A guessed pose brings in what is new, and leaves alone what is known.
             let known = self.points.entry(sighting.id);

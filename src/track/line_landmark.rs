@@ -50,8 +50,7 @@ impl LineLandmark {
         for (k, (point, depth)) in in_camera.iter().zip([start, end]).enumerate() {
             let sigmas = (view.sigma_px, depth.sigma_m());
             // What the pose adds is common to both ends; it is added below.
-            let of_end =
-                back_projected(&view.camera, &view.camera_from_world, point, sigmas, &Matrix6::zeros());
+            let of_end = back_projected(&view.camera, &view.camera_from_world, point, sigmas, &Matrix6::zeros());
             covariance
                 .fixed_view_mut::<2, 2>(2 * k, 2 * k)
                 .copy_from(&(across.transpose() * of_end * across));
@@ -165,12 +164,12 @@ pub(super) struct PendingLine {
 impl PendingLine {
     /// Takes a measurement; gives the line where it is known well enough by now.
     ///
-    /// * `starving` — whether there is little else to track against.
+    /// * `numbers` — that were measured of landmarks that are known.
     pub(super) fn push(
         &mut self,
         view: &View,
         sighting: &LineSighting,
-        starving: bool,
+        numbers: usize,
     ) -> Option<LineLandmark> {
         if self.views.len() >= MOST_VIEWS {
             let mut keep = false;
@@ -189,7 +188,7 @@ impl PendingLine {
         if widest > 1.0 - 0.5 * LEAST_PARALLAX * LEAST_PARALLAX {
             return None;
         }
-        self.triangulated(most_doubt(starving))
+        self.triangulated(most_doubt(numbers))
     }
 
     fn triangulated(&self, most_doubt: f64) -> Option<LineLandmark> {
@@ -230,11 +229,6 @@ impl PendingLine {
         }
         let covariance = inverse(&information)?;
         let distance = (last.camera_from_world * segment.midpoint()).coords.norm();
-        (covariance.trace().sqrt() < MOST_DOUBT * distance).then_some(LineLandmark {
-            segment,
-            covariance,
-            contradictions: 0,
-        })
         (covariance.trace().sqrt() < most_doubt * distance)
             .then_some(LineLandmark { segment, covariance, contradictions: 0 })
     }

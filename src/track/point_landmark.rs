@@ -41,8 +41,7 @@ impl PointLandmark {
         let depth = sighting.depth?;
         let in_camera = view.camera.back_project(sighting.pixel, depth.depth_m());
         let sigmas = (view.sigma_px, depth.sigma_m());
-        let covariance =
-            back_projected(&view.camera, &view.camera_from_world, &in_camera, sigmas, &view.covariance);
+        let covariance = back_projected(&view.camera, &view.camera_from_world, &in_camera, sigmas, &view.covariance);
         let point = view.camera_from_world.inverse() * in_camera;
         point.iter().chain(covariance.iter()).all(|number| number.is_finite()).then_some(Self {
             point,
@@ -53,12 +52,7 @@ impl PointLandmark {
 
     /// The point with a measurement of it.
     pub(super) fn matched(&self, sighting: &PointSighting) -> PointMatch {
-        PointMatch {
-            point: self.point,
-            covariance: self.covariance,
-            pixel: sighting.pixel,
-            depth: sighting.depth,
-        }
+        PointMatch { point: self.point, covariance: self.covariance, pixel: sighting.pixel, depth: sighting.depth }
     }
 
     /// Takes a measurement that agrees.
@@ -83,8 +77,10 @@ impl PointLandmark {
 
 /// How doubtful a triangulated landmark may be, sigma over distance: more where little else is known, for a common error of the first
 /// ones, such as their scale, stays with all that follow.
-pub(super) const fn most_doubt(starving: bool) -> f64 {
-    if starving { 0.2 } else { 0.03 }
+///
+/// * `numbers` — that were measured of landmarks that are known.
+pub(super) fn most_doubt(numbers: usize) -> f64 {
+    0.03 + 0.17 * (1.0 - numbers as f64 / 60.0).max(0.0)
 }
 
 /// Where a point without depth was seen, until its place is known.
@@ -96,12 +92,12 @@ pub(super) struct PendingPoint {
 impl PendingPoint {
     /// Takes a measurement; gives the point where it is known well enough by now.
     ///
-    /// * `starving` — whether there is little else to track against.
+    /// * `numbers` — that were measured of landmarks that are known.
     pub(super) fn push(
         &mut self,
         view: &View,
         sighting: &PointSighting,
-        starving: bool,
+        numbers: usize,
     ) -> Option<PointLandmark> {
         if self.views.len() >= MOST_VIEWS {
             let mut keep = false;
@@ -120,7 +116,7 @@ impl PendingPoint {
         if widest > 1.0 - 0.5 * LEAST_PARALLAX * LEAST_PARALLAX {
             return None;
         }
-        self.triangulated(most_doubt(starving))
+        self.triangulated(most_doubt(numbers))
     }
 
     fn triangulated(&self, most_doubt: f64) -> Option<PointLandmark> {
@@ -133,8 +129,7 @@ impl PendingPoint {
         let mut information = Matrix3::<f64>::zeros();
         let mut cost = 0.0;
         for (view, pixel) in &self.views {
-            let at =
-                PointMatch { point: found.point, covariance: Matrix3::zeros(), pixel: *pixel, depth: None };
+            let at = PointMatch { point: found.point, covariance: Matrix3::zeros(), pixel: *pixel, depth: None };
             let residual = at.residual(&view.camera, &view.camera_from_world, view.sigma_px)?;
             let noise = residual.noise + residual.by_pose * view.covariance * residual.by_pose.transpose();
             let weight = inverse(&noise)?;
@@ -147,11 +142,6 @@ impl PendingPoint {
         let covariance = inverse(&information)?;
         let (view, _) = self.views.last()?;
         let distance = (view.camera_from_world * found.point).coords.norm();
-        (covariance.trace().sqrt() < MOST_DOUBT * distance).then_some(PointLandmark {
-            point: found.point,
-            covariance,
-            contradictions: 0,
-        })
         (covariance.trace().sqrt() < most_doubt * distance)
             .then_some(PointLandmark { point: found.point, covariance, contradictions: 0 })
     }

@@ -6,6 +6,7 @@ mod elimination;
 mod error;
 mod estimation;
 mod factor;
+mod grouping;
 mod line_factor;
 mod line_form;
 mod line_sight;
@@ -20,7 +21,9 @@ mod point_sight;
 mod pose_factor;
 mod problem;
 mod reduced_system;
+mod shared_line;
 mod summary;
+mod uncertainty;
 mod whitening;
 
 pub use adjustment::{Adjusted, adjust, adjust_watched};

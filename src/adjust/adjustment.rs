@@ -76,6 +76,7 @@ pub fn adjust_watched(
             // Lines are weighed anew for where they are now, and tied to groups that they agree with.
             again = true;
             if options.parallelism != Parallelism::Ignored {
+                estimation.hold_scale(&observations)?;
                 grouping = Grouping::tested(graph, &observations, &estimation, &mut summary);
             }
         }

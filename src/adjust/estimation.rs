@@ -1,5 +1,6 @@
 //! The least-squares problem of observations, and the way back from it.
 
+use super::covariances::Covariances;
 use super::error::Error;
 use super::grouping::Grouping;
 use super::line_factor::LineFactor;
@@ -7,10 +8,10 @@ use super::line_form::{CayleySpace, EndpointsSpace, LineForm};
 use super::loss::Loss;
 use super::minimise::Step;
 use super::observations::Observations;
-use super::options::{LineKind, Method, Options, Parallelism};
+use super::options::{LineKind, Options, Parallelism};
 use super::parametrisation::{DirectionSpace, LineSpace, PoseSpace, VectorSpace};
 use super::point_factor::PointFactor;
-use super::pose_factor::{PosePriorFactor, RelativePoseFactor};
+use super::pose_factor::{PosePriorFactor, RelativePoseFactor, ScaleFactor};
 use super::problem::{Problem, Variable};
 use super::shared_line::{ParallelFactor, RightAngleFactor, SharedLineFactor, shared_plucker};
 use super::summary::Summary;
@@ -19,7 +20,7 @@ use crate::geometry::{PluckerLine, Segment};
 use crate::structure::{
     Estimate, Iteration, MapLine, MapPoint, PoseRow, TrajectoryPose,
 };
-use nalgebra::{Matrix3x4, Matrix6, Point2, Point3, Vector3, Vector6};
+use nalgebra::{Matrix3x4, Matrix6, Point2, Point3, SMatrix, Vector3, Vector6};
 use std::marker::PhantomData;
 use std::sync::Arc;
 
@@ -271,6 +272,47 @@ impl Estimation {
         self.problem.add_factors(weak, Loss::None)
     }
 
+    /// Fixes the scale of every part of the graph in which pixels alone leave it open; whether there was any.
+    ///
+    /// By the distance of the centre that lies farthest from a held one. Uncertainties are then those at this scale.
+    pub(super) fn hold_scale(&mut self, observations: &Observations) -> Result<bool, Error> {
+        let components = observations.components();
+        let centres: Vec<Vector3<f64>> =
+            observations.frames.iter().map(|frame| frame.camera_from_world.inverse().translation()).collect();
+        let mut has_depth = vec![false; components.len()];
+        for view in &observations.point_views {
+            has_depth[components[view.frame]] |= view.depth.is_some();
+        }
+        for view in &observations.line_views {
+            has_depth[components[view.frame]] |= view.depths.iter().any(Option::is_some);
+        }
+        observations.relatives.iter().for_each(|view| has_depth[components[view.frame]] = true);
+        let mut factors = Vec::new();
+        for part in 0..components.len() {
+            let frames: Vec<usize> = (0..components.len()).filter(|frame| components[*frame] == part).collect();
+            let mut held = frames.iter().filter(|frame| self.problem.is_held(self.poses[**frame]));
+            let Some(first) = held.next() else { continue };
+            let has_two = held.any(|frame| (centres[*frame] - centres[*first]).norm() > 1e-9);
+            if has_depth[part] || has_two {
+                continue;
+            }
+            let distance = |frame: &usize| (centres[*frame] - centres[*first]).norm();
+            let farthest = frames.iter().max_by(|a, b| distance(a).total_cmp(&distance(b)));
+            if let Some(farthest) = farthest.filter(|frame| distance(frame) > 1e-9) {
+                let distance_m = distance(farthest);
+                factors.push(ScaleFactor {
+                    variables: [self.poses[*farthest]],
+                    from: centres[*first],
+                    distance_m,
+                    sigma_m: 1e-3 * distance_m,
+                });
+            }
+        }
+        let open = !factors.is_empty();
+        self.problem.add_factors(factors, Loss::None)?;
+        Ok(open)
+    }
+
     /// Writes the problem's values into the observations' vertices.
     pub(super) fn read(&self, observations: &mut Observations) {
         let values = self.problem.values();
@@ -304,15 +346,21 @@ impl Estimation {
         }
     }
 
-    /// The direction of a free line, length one, and its derivative by a step.
-    pub(super) fn direction_of(&self, variable: Variable) -> (Vector3<f64>, Matrix3x4<f64>) {
+    /// Moment and direction of a free line, of some common scale, and their derivative by a step.
+    pub(super) fn free_line(&self, variable: Variable) -> (Vector3<f64>, Vector3<f64>, SMatrix<f64, 6, 4>) {
         let values = self.problem.values();
         let numbers = values.of(variable);
-        let ((_, direction), derivative) = match self.line_kind {
+        let ((moment, direction), derivative) = match self.line_kind {
             LineKind::Orthonormal => (<LineSpace as LineForm>::plucker(numbers), LineSpace::derivative(numbers)),
             LineKind::Endpoints => (EndpointsSpace::plucker(numbers), EndpointsSpace::derivative(numbers)),
             LineKind::PluckerCayley => (CayleySpace::plucker(numbers), CayleySpace::derivative(numbers)),
         };
+        (moment, direction, derivative)
+    }
+
+    /// The direction of a free line, length one, and its derivative by a step.
+    pub(super) fn direction_of(&self, variable: Variable) -> (Vector3<f64>, Matrix3x4<f64>) {
+        let (_, direction, derivative) = self.free_line(variable);
         let length = direction.norm();
         let direction = direction / length;
         let by_step = derivative.fixed_view::<3, 4>(3, 0) / length;
@@ -321,7 +369,7 @@ impl Estimation {
 
     /// The estimate, from observations that were read.
     pub(super) fn estimate(
-        &self,
+        &mut self,
         observations: &Observations,
         options: &Options,
         steps: &[Step],
@@ -329,17 +377,28 @@ impl Estimation {
     ) -> Result<Estimate, Error> {
         let name = options.estimate_name().to_owned();
         summary.residual_rms = self.residual_rms();
+        let mut covariances = if options.covariance {
+            self.hold_scale(observations)?;
+            self.covariances(observations)?
+        } else {
+            Covariances::default()
+        };
+        let mut of_pose = covariances.poses.drain(..);
         let trajectory = observations.frames.iter().map(|frame| {
-            TrajectoryPose::new(name.clone(), frame.frame_id, PoseRow::from(&frame.camera_from_world.inverse()))
+            let pose = PoseRow::from(&frame.camera_from_world.inverse());
+            let row = TrajectoryPose::new(name.clone(), frame.frame_id, pose);
+            TrajectoryPose { covariance: of_pose.next(), ..row }
         });
+        let mut of_point = covariances.points.drain(..);
         let points = observations.points.iter().map(|point| MapPoint {
             estimate: name.clone(),
             point_id: point.point_id,
             x: point.position.x,
             y: point.position.y,
             z: point.position.z,
-            covariance: None,
+            covariance: of_point.next(),
         });
+        let mut of_line = covariances.lines.drain(..);
         let lines = observations.lines.iter().map(|line| {
             let Segment { start, end } = line.segment;
             MapLine {
@@ -351,7 +410,7 @@ impl Estimation {
                 end_x: end.x,
                 end_y: end.y,
                 end_z: end.z,
-                covariance: None,
+                covariance: of_line.next(),
             }
         });
         let iterations = (0..).zip(steps).map(|(iteration, step)| Iteration {

@@ -14,6 +14,9 @@ const CONTRADICTION: f64 = 13.8155;
 /// Directions are taken to be no better known than this, radians: what is left of rounding and of linearisation.
 const LEAST_SIGMA_RAD: f64 = 1e-4;
 
+/// Lines of the truth that differ by more than this are not parallel, radians.
+const EXACT_RAD: f64 = 1e-3;
+
 /// Most degrees off at which a line may still be tested: farther away, tangents mean nothing.
 const FARTHEST_RAD: f64 = 0.35;
 
@@ -69,6 +72,43 @@ impl Grouping {
                 found.of_line[line] = Some(found.directions.len());
             }
             found.directions.push(direction);
+        }
+        found.find_right_angles(graph, &group_places);
+        summary.grouped = found.of_line.iter().flatten().count();
+        found
+    }
+
+    /// Groups as they are where values are the truth: lines within a thousandth of a radian of their group's direction.
+    pub(super) fn given(graph: &FactorGraph, observations: &Observations, summary: &mut Summary) -> Self {
+        let mut found = Self::none(observations);
+        let places: BTreeMap<LineId, usize> =
+            observations.lines.iter().enumerate().map(|(at, line)| (line.line_id, at)).collect();
+        let mut group_places = BTreeMap::new();
+        let mut taken = BTreeSet::new();
+        for group in graph.groups.iter().filter(|group| !group.is_made_of_groups()) {
+            let ids: BTreeSet<LineId> = group.line_ids.iter().copied().collect();
+            let lines: Vec<usize> =
+                ids.iter().filter_map(|id| places.get(id).copied()).filter(|line| taken.insert(*line)).collect();
+            let direction = |line: usize| observations.lines[line].line.direction;
+            let Some(common) = consensus(&lines, direction) else { continue };
+            let (kept, off): (Vec<usize>, Vec<usize>) =
+                lines.iter().partition(|line| common.cross(&direction(**line)).norm() < EXACT_RAD);
+            for line in off {
+                summary.released.push(ReleasedLine {
+                    line_id: observations.lines[line].line_id,
+                    group_id: group.group_id,
+                    angle_rad: libm::asin(common.cross(&direction(line)).norm().min(1.0)),
+                    chi_squared: f64::INFINITY,
+                });
+            }
+            if kept.len() < 2 {
+                continue;
+            }
+            group_places.insert(group.group_id, (found.directions.len(), ids));
+            for line in kept {
+                found.of_line[line] = Some(found.directions.len());
+            }
+            found.directions.push(common);
         }
         found.find_right_angles(graph, &group_places);
         summary.grouped = found.of_line.iter().flatten().count();

@@ -2,6 +2,8 @@
 
 mod adjustment;
 mod block_pattern;
+mod bound;
+mod covariances;
 mod elimination;
 mod error;
 mod estimation;
@@ -27,6 +29,7 @@ mod uncertainty;
 mod whitening;
 
 pub use adjustment::{Adjusted, adjust, adjust_watched};
+pub use bound::{Alignment, Bound, bound};
 pub use error::Error;
 pub use factor::{Factor, MOST_RESIDUALS};
 pub use loss::Loss;

@@ -1,10 +1,11 @@
 //! A factor graph into an estimate.
 
 use super::error::Error;
-use super::estimation::Estimation;
+use super::estimation::{Estimation, recover_ends};
+use super::grouping::Grouping;
 use super::minimise::{Step, minimise_watched};
 use super::observations::Observations;
-use super::options::Options;
+use super::options::{Method, Options, Parallelism};
 use super::summary::{Reason, Summary};
 use crate::structure::{Estimate, FactorGraph};
 
@@ -56,23 +57,36 @@ pub fn adjust_watched(
             return Err(Error::UnknownFrame { graph: graph.name.clone(), frame: *frame });
         }
     }
-    let mut estimation = Estimation::new(&observations, graph, options, &mut summary)?;
+    let mut grouping = Grouping::none(&observations);
+    let mut estimation = Estimation::new(&observations, &grouping, options, &mut summary)?;
+    let is_structural = options.method == Method::Structural;
     let mut steps: Vec<Step> = Vec::new();
     for round in 0..MOST_ROUNDS {
         let minimum = minimise_watched(&mut estimation.problem, &options.solver, watch)?;
-        if steps.is_empty() {
+        if round == 0 {
             summary.initial_cost = minimum.initial_cost;
         }
-        // A later round begins where the one before ended.
-        steps.extend(minimum.steps.into_iter().skip(usize::from(round > 0)));
+        // A later round begins where the one before ended, but for what it left out or tied.
+        steps.extend(minimum.steps);
         summary.final_cost = minimum.final_cost;
         summary.ending = minimum.ending;
         estimation.read(&mut observations);
-        let behind = observations.drop_behind(&mut summary);
-        if round + 1 == MOST_ROUNDS || !(behind || estimation.needs_another(options, &observations, round)) {
+        let mut again = observations.drop_behind(&mut summary);
+        if round == 0 && is_structural {
+            // Lines are weighed anew for where they are now, and tied to groups that they agree with.
+            again = true;
+            if options.parallelism != Parallelism::Ignored {
+                estimation.hold_scale(&observations)?;
+                grouping = Grouping::tested(graph, &observations, &estimation, &mut summary);
+            }
+        }
+        if !again || round + 1 == MOST_ROUNDS {
             break;
         }
-        estimation = Estimation::new(&observations, graph, options, &mut summary)?;
+        estimation = Estimation::new(&observations, &grouping, options, &mut summary)?;
+    }
+    if is_structural {
+        recover_ends(&mut observations);
     }
     summary.iterations = steps.len().saturating_sub(1);
     let estimate = estimation.estimate(&observations, options, &steps, &mut summary)?;

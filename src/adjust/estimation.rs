@@ -1,26 +1,35 @@
 //! The least-squares problem of observations, and the way back from it.
 
+use super::covariances::Covariances;
 use super::error::Error;
+use super::grouping::Grouping;
 use super::line_factor::LineFactor;
 use super::line_form::{CayleySpace, EndpointsSpace, LineForm};
 use super::loss::Loss;
 use super::minimise::Step;
 use super::observations::Observations;
-use super::options::{LineKind, Method, Options};
-use super::parametrisation::{LineSpace, PoseSpace, VectorSpace};
+use super::options::{LineKind, Options, Parallelism};
+use super::parametrisation::{DirectionSpace, LineSpace, PoseSpace, VectorSpace};
 use super::point_factor::PointFactor;
-use super::pose_factor::{PosePriorFactor, RelativePoseFactor};
+use super::pose_factor::{PosePriorFactor, RelativePoseFactor, ScaleFactor};
 use super::problem::{Problem, Variable};
+use super::shared_line::{ParallelFactor, RightAngleFactor, SharedLineFactor, shared_plucker};
 use super::summary::Summary;
 use super::whitening::{depth_sight, ends_depth_sight, ends_sight, pixel_sight};
 use crate::geometry::{PluckerLine, Segment};
 use crate::structure::{Estimate, FactorGraph, Iteration, MapLine, MapPoint, PoseRow, TrajectoryPose};
 use nalgebra::{Matrix6, Point3, Vector3, Vector6};
+use crate::structure::{
+    Estimate, Iteration, MapLine, MapPoint, PoseRow, TrajectoryPose,
+use nalgebra::{Matrix3x4, Matrix6, Point2, Point3, SMatrix, Vector3, Vector6};
 use std::marker::PhantomData;
 use std::sync::Arc;
 
 /// A frame whose measurements leave its pose open gets this prior: radians and metres.
 const WEAK_PRIOR: [f64; 2] = [1.0, 100.0];
+
+/// How far from a right angle directions may be that are perpendicular, radians: as good as never.
+const RIGHT_ANGLE_RAD: f64 = 1e-5;
 
 /// Numbers of residual from which on a frame's pose is not open by their count.
 const ENOUGH_FOR_A_POSE: usize = 6;
@@ -30,15 +39,24 @@ pub(super) struct Estimation {
     pub(super) problem: Problem,
     pub(super) poses: Vec<Variable>,
     pub(super) points: Vec<Variable>,
-    pub(super) lines: Vec<Variable>,
+    pub(super) lines: Vec<LineHandle>,
     line_kind: LineKind,
+}
+
+/// The variables of a line.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum LineHandle {
+    /// One with four degrees of freedom.
+    Free(Variable),
+    /// A direction that it shares, and two degrees of freedom of its own about a place near it.
+    Shared { direction: Variable, offset: Variable, origin: Vector3<f64> },
 }
 
 impl Estimation {
     /// Poses the problem.
     pub(super) fn new(
         observations: &Observations,
-        _graph: &FactorGraph,
+        grouping: &Grouping,
         options: &Options,
         summary: &mut Summary,
     ) -> Result<Self, Error> {
@@ -58,9 +76,13 @@ impl Estimation {
         let mut estimation = Self { problem, poses, points, lines: Vec::new(), line_kind: options.lines };
         estimation.add_points(observations, options)?;
         match options.lines {
-            LineKind::Orthonormal => estimation.add_lines(&Arc::new(LineSpace), observations, options)?,
-            LineKind::Endpoints => estimation.add_lines(&Arc::new(EndpointsSpace), observations, options)?,
-            LineKind::PluckerCayley => estimation.add_lines(&Arc::new(CayleySpace), observations, options)?,
+            LineKind::Orthonormal => estimation.add_lines(&Arc::new(LineSpace), observations, grouping, options)?,
+            LineKind::Endpoints => {
+                estimation.add_lines(&Arc::new(EndpointsSpace), observations, grouping, options)?;
+            },
+            LineKind::PluckerCayley => {
+                estimation.add_lines(&Arc::new(CayleySpace), observations, grouping, options)?;
+            },
         }
         estimation.add_relatives(observations, options)?;
         estimation.add_priors(observations, options)?;
@@ -96,28 +118,76 @@ impl Estimation {
         &mut self,
         space: &Arc<L>,
         observations: &Observations,
+        grouping: &Grouping,
         options: &Options,
     ) -> Result<(), Error> {
-        for line in &observations.lines {
-            let variable = self.problem.add(space, &L::numbers_of(&line.segment, &line.line));
-            self.lines.push(variable);
+        let directions: Vec<Variable> = {
+            let space = Arc::new(DirectionSpace);
+            let directions = grouping.directions.iter();
+            directions.map(|d| self.problem.add(&space, &DirectionSpace::numbers_of(d))).collect()
+        };
+        let exact = options.parallelism == Parallelism::Exact;
+        let offset_space = Arc::new(VectorSpace(2));
+        for (line, group) in observations.lines.iter().zip(&grouping.of_line) {
+            let handle = match group {
+                Some(group) if exact => {
+                    let origin = line.line.closest_point_to(line.segment.midpoint()).coords;
+                    let offset = self.problem.add(&offset_space, &[0.0; 2]);
+                    LineHandle::Shared { direction: directions[*group], offset, origin }
+                }
+                _ => LineHandle::Free(self.problem.add(space, &L::numbers_of(&line.segment, &line.line))),
+            };
+            self.lines.push(handle);
         }
-        let (mut ends, mut depths) = (Vec::new(), Vec::new());
+        let (mut ends, mut depths, mut shared_ends, mut shared_depths) =
+            (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for view in &observations.line_views {
-            let variables = [self.poses[view.frame], self.lines[view.line]];
+            let pose = self.poses[view.frame];
             let form = PhantomData::<L>;
-            if view.depths.iter().any(Option::is_some) {
+            let sight = if view.depths.iter().any(Option::is_some) {
                 let pose = &observations.frames[view.frame].camera_from_world;
                 let line = &observations.lines[view.line].line;
-                let sight = ends_depth_sight(view, &observations.noise, pose, line);
-                depths.push(LineFactor::<L, _, 4> { variables, sight, form });
+                Ok(ends_depth_sight(view, &observations.noise, pose, line))
             } else {
-                let sight = ends_sight(view, &observations.noise);
-                ends.push(LineFactor::<L, _, 2> { variables, sight, form });
+                Err(ends_sight(view, &observations.noise))
+            };
+            match (self.lines[view.line], sight) {
+                (LineHandle::Free(line), Ok(sight)) => {
+                    depths.push(LineFactor::<L, _, 4> { variables: [pose, line], sight, form });
+                }
+                (LineHandle::Free(line), Err(sight)) => {
+                    ends.push(LineFactor::<L, _, 2> { variables: [pose, line], sight, form });
+                }
+                (LineHandle::Shared { direction, offset, origin }, Ok(sight)) => {
+                    let variables = [pose, direction, offset];
+                    shared_depths.push(SharedLineFactor::<_, 4> { variables, origin, sight });
+                }
+                (LineHandle::Shared { direction, offset, origin }, Err(sight)) => {
+                    let variables = [pose, direction, offset];
+                    shared_ends.push(SharedLineFactor::<_, 2> { variables, origin, sight });
+                }
             }
         }
         self.problem.add_factors(ends, options.loss)?;
-        self.problem.add_factors(depths, options.loss)
+        self.problem.add_factors(depths, options.loss)?;
+        self.problem.add_factors(shared_ends, options.loss)?;
+        self.problem.add_factors(shared_depths, options.loss)?;
+        if let Parallelism::Soft { sigma_rad } = options.parallelism {
+            let tied = self.lines.iter().zip(&grouping.of_line).filter_map(|(line, group)| match (line, group) {
+                (LineHandle::Free(line), Some(group)) => {
+                    let variables = [*line, directions[*group]];
+                    Some(ParallelFactor { variables, sigma_rad, form: PhantomData::<L> })
+                }
+                _ => None,
+            });
+            let tied = tied.collect();
+            self.problem.add_factors(tied, options.loss)?;
+        }
+        let right_angles = grouping.right_angles.iter().map(|[a, b]| RightAngleFactor {
+            variables: [directions[*a], directions[*b]],
+            sigma_rad: RIGHT_ANGLE_RAD,
+        });
+        self.problem.add_factors(right_angles.collect(), Loss::None)
     }
 
     fn add_relatives(&mut self, observations: &Observations, options: &Options) -> Result<(), Error> {
@@ -206,6 +276,47 @@ impl Estimation {
         self.problem.add_factors(weak, Loss::None)
     }
 
+    /// Fixes the scale of every part of the graph in which pixels alone leave it open; whether there was any.
+    ///
+    /// By the distance of the centre that lies farthest from a held one. Uncertainties are then those at this scale.
+    pub(super) fn hold_scale(&mut self, observations: &Observations) -> Result<bool, Error> {
+        let components = observations.components();
+        let centres: Vec<Vector3<f64>> =
+            observations.frames.iter().map(|frame| frame.camera_from_world.inverse().translation()).collect();
+        let mut has_depth = vec![false; components.len()];
+        for view in &observations.point_views {
+            has_depth[components[view.frame]] |= view.depth.is_some();
+        }
+        for view in &observations.line_views {
+            has_depth[components[view.frame]] |= view.depths.iter().any(Option::is_some);
+        }
+        observations.relatives.iter().for_each(|view| has_depth[components[view.frame]] = true);
+        let mut factors = Vec::new();
+        for part in 0..components.len() {
+            let frames: Vec<usize> = (0..components.len()).filter(|frame| components[*frame] == part).collect();
+            let mut held = frames.iter().filter(|frame| self.problem.is_held(self.poses[**frame]));
+            let Some(first) = held.next() else { continue };
+            let has_two = held.any(|frame| (centres[*frame] - centres[*first]).norm() > 1e-9);
+            if has_depth[part] || has_two {
+                continue;
+            }
+            let distance = |frame: &usize| (centres[*frame] - centres[*first]).norm();
+            let farthest = frames.iter().max_by(|a, b| distance(a).total_cmp(&distance(b)));
+            if let Some(farthest) = farthest.filter(|frame| distance(frame) > 1e-9) {
+                let distance_m = distance(farthest);
+                factors.push(ScaleFactor {
+                    variables: [self.poses[*farthest]],
+                    from: centres[*first],
+                    distance_m,
+                    sigma_m: 1e-3 * distance_m,
+                });
+            }
+        }
+        let open = !factors.is_empty();
+        self.problem.add_factors(factors, Loss::None)?;
+        Ok(open)
+    }
+
     /// Writes the problem's values into the observations' vertices.
     pub(super) fn read(&self, observations: &mut Observations) {
         let values = self.problem.values();
@@ -216,12 +327,21 @@ impl Estimation {
             let numbers = values.of(*variable);
             point.position = Point3::new(numbers[0], numbers[1], numbers[2]);
         }
-        for (line, variable) in observations.lines.iter_mut().zip(&self.lines) {
-            let numbers = values.of(*variable);
-            let (moment, direction) = match self.line_kind {
-                LineKind::Orthonormal => <LineSpace as LineForm>::plucker(numbers),
-                LineKind::Endpoints => EndpointsSpace::plucker(numbers),
-                LineKind::PluckerCayley => CayleySpace::plucker(numbers),
+        for (line, handle) in observations.lines.iter_mut().zip(&self.lines) {
+            let (moment, direction) = match handle {
+                LineHandle::Free(variable) => {
+                    let numbers = values.of(*variable);
+                    match self.line_kind {
+                        LineKind::Orthonormal => <LineSpace as LineForm>::plucker(numbers),
+                        LineKind::Endpoints => EndpointsSpace::plucker(numbers),
+                        LineKind::PluckerCayley => CayleySpace::plucker(numbers),
+                    }
+                }
+                LineHandle::Shared { direction, offset, origin } => {
+                    let (moment, direction, _) =
+                        shared_plucker(values.of(*direction), values.of(*offset), origin);
+                    (moment, direction)
+                }
             };
             if let Some(found) = line_of(moment, direction, &line.line) {
                 line.segment = projected(&line.segment, &found);
@@ -238,11 +358,29 @@ impl Estimation {
         round: usize,
     ) -> bool {
         options.method == Method::Structural && round == 0
+    /// Moment and direction of a free line, of some common scale, and their derivative by a step.
+    pub(super) fn free_line(&self, variable: Variable) -> (Vector3<f64>, Vector3<f64>, SMatrix<f64, 6, 4>) {
+        let values = self.problem.values();
+        let numbers = values.of(variable);
+        let ((moment, direction), derivative) = match self.line_kind {
+            LineKind::Orthonormal => (<LineSpace as LineForm>::plucker(numbers), LineSpace::derivative(numbers)),
+            LineKind::Endpoints => (EndpointsSpace::plucker(numbers), EndpointsSpace::derivative(numbers)),
+            LineKind::PluckerCayley => (CayleySpace::plucker(numbers), CayleySpace::derivative(numbers)),
+        };
+        (moment, direction, derivative)
+    }
+    /// The direction of a free line, length one, and its derivative by a step.
+    pub(super) fn direction_of(&self, variable: Variable) -> (Vector3<f64>, Matrix3x4<f64>) {
+        let (_, direction, derivative) = self.free_line(variable);
+        let length = direction.norm();
+        let direction = direction / length;
+        let by_step = derivative.fixed_view::<3, 4>(3, 0) / length;
+        (direction, by_step - direction * (direction.transpose() * by_step))
     }
 
     /// The estimate, from observations that were read.
     pub(super) fn estimate(
-        &self,
+        &mut self,
         observations: &Observations,
         options: &Options,
         steps: &[Step],
@@ -250,21 +388,33 @@ impl Estimation {
     ) -> Result<Estimate, Error> {
         let name = options.estimate_name().to_owned();
         summary.residual_rms = self.residual_rms();
+        let mut covariances = if options.covariance {
+            self.hold_scale(observations)?;
+            self.covariances(observations)?
+        } else {
+            Covariances::default()
+        };
+        let mut of_pose = covariances.poses.drain(..);
         let trajectory = observations.frames.iter().map(|frame| {
             TrajectoryPose::new(
                 name.clone(),
                 frame.frame_id,
                 PoseRow::from(&frame.camera_from_world.inverse()),
             )
+            let pose = PoseRow::from(&frame.camera_from_world.inverse());
+            let row = TrajectoryPose::new(name.clone(), frame.frame_id, pose);
+            TrajectoryPose { covariance: of_pose.next(), ..row }
         });
+        let mut of_point = covariances.points.drain(..);
         let points = observations.points.iter().map(|point| MapPoint {
             estimate: name.clone(),
             point_id: point.point_id,
             x: point.position.x,
             y: point.position.y,
             z: point.position.z,
-            covariance: None,
+            covariance: of_point.next(),
         });
+        let mut of_line = covariances.lines.drain(..);
         let lines = observations.lines.iter().map(|line| {
             let Segment { start, end } = line.segment;
             MapLine {
@@ -276,7 +426,7 @@ impl Estimation {
                 end_x: end.x,
                 end_y: end.y,
                 end_z: end.z,
-                covariance: None,
+                covariance: of_line.next(),
             }
         });
         let iterations = (0..).zip(steps).map(|(iteration, step)| Iteration {
@@ -338,4 +488,39 @@ pub(super) fn line_of(
 /// The piece of a line between the feet of a segment's ends.
 pub(super) fn projected(segment: &Segment, line: &PluckerLine) -> Segment {
     Segment { start: line.closest_point_to(segment.start), end: line.closest_point_to(segment.end) }
+}
+
+/// Puts the ends of every line where its measured ends lie: the hull of their feet, but for a few farthest ones.
+///
+/// The foot of a measured end is the point of the line nearest to its viewing ray.
+pub(super) fn recover_ends(observations: &mut Observations) {
+    let mut places: Vec<Vec<f64>> = vec![Vec::new(); observations.lines.len()];
+    for view in &observations.line_views {
+        let line = &observations.lines[view.line].line;
+        let world_from_camera = observations.frames[view.frame].camera_from_world.inverse();
+        let origin = line.closest_point_to_origin();
+        for end in view.ends {
+            let centre = Point3::from(world_from_camera.translation());
+            let ray = world_from_camera.transform_vector(&view.camera.ray(Point2::from(end)));
+            let foot = PluckerLine::through(centre, centre + ray).ok();
+            if let Some(foot) = foot.and_then(|ray| line.closest_point_to_line(&ray)) {
+                places[view.line].push((foot - origin).dot(&line.direction));
+            }
+        }
+    }
+    for (line, places) in observations.lines.iter_mut().zip(&mut places) {
+        places.retain(|place| place.is_finite());
+        if places.len() < 4 {
+            continue;
+        }
+        places.sort_by(f64::total_cmp);
+        // Noise moves the farthest of many measured ends outwards.
+        let cut = places.len() / 50;
+        let (low, high) = (places[cut], places[places.len() - 1 - cut]);
+        if high > low {
+            let origin = line.line.closest_point_to_origin();
+            let (start, end) = (origin + line.line.direction * low, origin + line.line.direction * high);
+            line.segment = Segment { start, end };
+        }
+    }
 }

@@ -2,10 +2,13 @@
 
 mod adjustment;
 mod block_pattern;
+mod bound;
+mod covariances;
 mod elimination;
 mod error;
 mod estimation;
 mod factor;
+mod grouping;
 mod line_factor;
 mod line_form;
 mod line_sight;
@@ -20,10 +23,13 @@ mod point_sight;
 mod pose_factor;
 mod problem;
 mod reduced_system;
+mod shared_line;
 mod summary;
+mod uncertainty;
 mod whitening;
 
 pub use adjustment::{Adjusted, adjust, adjust_watched};
+pub use bound::{Alignment, Bound, bound};
 pub use error::Error;
 pub use factor::{Factor, MOST_RESIDUALS};
 pub use loss::Loss;

@@ -32,8 +32,6 @@ pub(super) struct NormalEquations {
     ties: Vec<f64>,
     /// `H_ee⁻¹ W`, in the same places.
     solved_ties: Vec<f64>,
-    /// `H_ee⁻¹ g_e`.
-    solved_gradient: Vec<f64>,
     /// `H_ee⁻¹`, row by row, kept for covariances.
     inverses: Vec<f64>,
     column_starts: Vec<usize>,
@@ -50,7 +48,6 @@ impl NormalEquations {
             block_start.push(block_start[block_start.len() - 1] + size * size);
         }
         let unknowns = step_start[step_start.len() - 1];
-        let reduced = system.rows();
         let ties = structure.edge_start[structure.edge_start.len() - 1];
         let blocks = block_start[block_start.len() - 1];
         let inverses = blocks - block_start[structure.reduced.len()];
@@ -64,7 +61,6 @@ impl NormalEquations {
             block_start,
             ties: vec![0.0; ties],
             solved_ties: vec![0.0; ties],
-            solved_gradient: vec![0.0; unknowns - reduced],
             inverses: vec![0.0; inverses],
             step_start,
             column_starts,
@@ -172,19 +168,20 @@ impl NormalEquations {
         let bounds: Vec<usize> = (0..eliminated).step_by(CHUNK).chain([eliminated]).collect();
         let (step_start, block_start) = (&self.step_start, &self.block_start);
         let first_number = |at: usize| structure.edge_start[structure.edges.start[at]];
-        let (first_step, first_block) = (step_start[reduced], block_start[reduced]);
+        let first_block = block_start[reduced];
         let solved_ties = split(&mut self.solved_ties, bounds.iter().map(|at| first_number(*at)));
         let gradients =
             split(&mut self.solved_gradient, bounds.iter().map(|at| step_start[reduced + at] - first_step));
         let inverses =
             split(&mut self.inverses, bounds.iter().map(|at| block_start[reduced + at] - first_block));
         let (blocks, ties, gradient, diagonal) = (&self.blocks, &self.ties, &self.gradient, &self.diagonal);
+        let inverses = split(&mut self.inverses, bounds.iter().map(|at| block_start[reduced + at] - first_block));
+        let (blocks, ties, diagonal) = (&self.blocks, &self.ties, &self.diagonal);
         solved_ties
             .into_par_iter()
-            .zip(gradients)
             .zip(inverses)
             .enumerate()
-            .map(|(chunk, ((solved_ties, solved_gradient), inverses))| {
+            .map(|(chunk, (solved_ties, inverses))| {
                 let first = bounds[chunk];
                 let begin = first_number(first);
                 for at in first..bounds[chunk + 1] {
@@ -195,6 +192,8 @@ impl NormalEquations {
                     let inverse =
                         &mut inverses[block_start[variable] - block_start[reduced + first]..][..size * size];
                     let diagonal = &diagonal[steps.clone()];
+                    let inverse = &mut inverses[block_start[variable] - block_start[reduced + first]..][..size * size];
+                    let diagonal = &diagonal[steps];
                     let positive = match size {
                         6 => invert::<6>(block, diagonal, damping, inverse),
                         4 => invert::<4>(block, diagonal, damping, inverse),
@@ -278,6 +277,10 @@ impl NormalEquations {
                         (4, 6, 6) => {
                             subtract::<4, 6, 6>(tie, solved, values, row == column, |c| places.at(row, c))
                         }
+                        (3, 6, 6) => subtract::<3, 6, 6>(tie, solved, values, row == column, |c| places.at(row, c)),
+                        (6, 3, 3) => subtract::<6, 3, 3>(tie, solved, values, row == column, |c| places.at(row, c)),
+                        (2, 6, 6) => subtract::<2, 6, 6>(tie, solved, values, row == column, |c| places.at(row, c)),
+                        (4, 6, 6) => subtract::<4, 6, 6>(tie, solved, values, row == column, |c| places.at(row, c)),
                         _ => {
                             let shape = [inner, rows, size];
                             subtract_any(shape, tie, solved, values, row == column, |c| places.at(row, c));
@@ -293,12 +296,36 @@ impl NormalEquations {
     ///
     /// * `right`, `step` — unknowns in the order of the step.
     pub(super) fn solve(&self, right: &[f64], step: &mut [f64]) {
+        self.reduce_right(right, step);
+        let (reduced, _) = step.split_at_mut(self.system.rows());
+        self.system.solve(reduced);
+        self.substitute(step);
+    }
+
+    /// As [`NormalEquations::solve`], for several right sides at once.
+    pub(super) fn solve_all(&self, rights: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let rows = self.system.rows();
+        let mut steps: Vec<Vec<f64>> = rights.iter().map(|right| vec![0.0; right.len()]).collect();
+        let mut sides = Vec::with_capacity(rows * rights.len());
+        for (right, step) in rights.iter().zip(&mut steps) {
+            self.reduce_right(right, step);
+            sides.extend_from_slice(&step[..rows]);
+        }
+        self.system.solve(&mut sides);
+        for (index, step) in steps.iter_mut().enumerate() {
+            step[..rows].copy_from_slice(&sides[index * rows..(index + 1) * rows]);
+            self.substitute(step);
+        }
+        steps
+    }
+
+    /// The right side of the reduced system, and `H_ee⁻¹` times that of the eliminated variables.
+    fn reduce_right(&self, right: &[f64], step: &mut [f64]) {
         let structure = &self.structure;
         let rows = self.system.rows();
+        let reduced = structure.reduced.len();
         let (reduced_step, eliminated_step) = step.split_at_mut(rows);
         let (reduced_right, eliminated_right) = right.split_at(rows);
-        // right_e through the inverses, and from there to the reduced side.
-        let reduced = structure.reduced.len();
         for at in 0..structure.eliminated.len() {
             let size = structure.eliminated_sizes[at];
             let begin = self.step_start[reduced + at] - rows;
@@ -310,6 +337,8 @@ impl NormalEquations {
                 1,
                 &mut eliminated_step[begin..begin + size],
             );
+            let target = &mut eliminated_step[begin..begin + size];
+            multiply(self.inverse(at), &eliminated_right[begin..begin + size], size, 1, target);
         }
         reduced_step.copy_from_slice(reduced_right);
         for column in 0..reduced {
@@ -328,7 +357,14 @@ impl NormalEquations {
                 }
             }
         }
-        self.system.solve(reduced_step);
+    }
+
+    /// Steps of the eliminated variables from those of the reduced ones.
+    fn substitute(&self, step: &mut [f64]) {
+        let structure = &self.structure;
+        let rows = self.system.rows();
+        let reduced = structure.reduced.len();
+        let (reduced_step, eliminated_step) = step.split_at_mut(rows);
         for at in 0..structure.eliminated.len() {
             let size = structure.eliminated_sizes[at];
             let begin = self.step_start[reduced + at] - rows;
@@ -350,11 +386,6 @@ impl NormalEquations {
         let reduced = self.structure.reduced.len();
         let first = self.block_start[reduced];
         &self.inverses[self.block_start[reduced + at] - first..self.block_start[reduced + at + 1] - first]
-    }
-
-    /// `H_ee⁻¹ W` of an edge, row by row.
-    pub(super) fn solved_tie(&self, edge: usize) -> &[f64] {
-        &self.solved_ties[self.structure.edge_start[edge]..self.structure.edge_start[edge + 1]]
     }
 
     /// The gradient `Jᵀr`.

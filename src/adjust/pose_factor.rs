@@ -1,7 +1,7 @@
 //! Residuals of poses alone: relative poses and priors.
 
 use super::factor::Factor;
-use super::parametrisation::PoseSpace;
+use super::parametrisation::{PoseSpace, rotation, translation};
 use super::problem::{Values, Variable};
 use crate::geometry::Pose;
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
@@ -86,8 +86,7 @@ pub(super) fn adjoint(pose: &Pose) -> Matrix6<f64> {
 
 /// `J⁻¹(ξ)`: `log(Exp(δ) Exp(ξ)) = ξ + J⁻¹(ξ) δ`.
 ///
-/// `J⁻¹ = I − ½ ad + Σ B₂ₖ/(2k)! ad²ᵏ`, summed by halving: the series converges for turns under 2π, and fast where they are small. For larger
-/// turns the closed form of its SO(3) part is used, with the mixed part by the product rule on quaternion terms.
+/// With `J_l` of SO(3) and its mixed block `Q(ω, v)`: `J⁻¹ = [J_l⁻¹, 0; −J_l⁻¹ Q J_l⁻¹, J_l⁻¹]`.
 ///
 /// # Source
 /// Barfoot, *State Estimation for Robotics*, sections 7.1.5 and 8.
@@ -141,4 +140,38 @@ fn mixed_block(w: &Vector3<f64>, v: &Vector3<f64>) -> Matrix3<f64> {
         + (ab + ba + a * ba) * c1
         + (a * ab + ba * a - a * ba * 3.0) * c2
         + (a * ba * a + a * a * ba) * (0.5 * (c2 + 3.0 * c3))
+}
+
+/// The distance between a pose's centre and a place that is held: it fixes the scale that pixels alone leave open.
+///
+/// It is met where it begins and is the only one of its kind, so that it changes no cost.
+pub(super) struct ScaleFactor {
+    pub(super) variables: [Variable; 1],
+    pub(super) from: Vector3<f64>,
+    pub(super) distance_m: f64,
+    pub(super) sigma_m: f64,
+}
+
+impl Factor for ScaleFactor {
+    const RESIDUALS: usize = 1;
+    type Variables = [Variable; 1];
+
+    fn variables(&self) -> [Variable; 1] {
+        self.variables
+    }
+
+    fn evaluate(&self, values: &Values<'_>, residual: &mut [f64], jacobian: Option<&mut [f64]>) -> bool {
+        let numbers = values.of(self.variables[0]);
+        let (r, t) = (rotation(numbers), translation(numbers));
+        let along = -(r.transpose() * t) - self.from;
+        let distance = along.norm();
+        residual[0] = (distance - self.distance_m) / self.sigma_m;
+        if let Some(jacobian) = jacobian {
+            // c = −Rᵀ t moves by −Rᵀ v.
+            let by_shift = -(r * along) / (distance * self.sigma_m);
+            jacobian[..3].fill(0.0);
+            jacobian[3..].copy_from_slice(by_shift.as_slice());
+        }
+        distance > 0.0
+    }
 }

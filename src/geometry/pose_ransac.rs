@@ -27,6 +27,25 @@ impl Default for RansacOptions {
     }
 }
 
+impl RansacOptions {
+    /// Samples of a size until one has no outlier, with the confidence asked for.
+    ///
+    /// * `share` — of inliers.
+    pub(super) fn samples_for(&self, share: f64, size: i32) -> u32 {
+        let failure = 1.0 - share.powi(size);
+        if failure <= 0.0 {
+            return 1;
+        }
+        let needed = libm::log(1.0 - self.confidence) / libm::log(failure);
+        if needed.is_nan() || needed >= f64::from(self.most_samples) {
+            return self.most_samples;
+        }
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between one and most_samples")]
+        let needed = needed.ceil().max(1.0) as u32;
+        needed
+    }
+}
+
 /// The pose on which the most points agree.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PoseConsensus {
@@ -71,7 +90,7 @@ pub fn ransac_pose(
             let least = best.map_or(f64::INFINITY, |(score, ..)| score);
             let Some((score, inliers)) = score(camera, points, &pose, limit, least) else { continue };
             best = Some((score, pose, inliers));
-            needed = needed.min(samples_for(inliers as f64 / count as f64, options));
+            needed = needed.min(options.samples_for(inliers as f64 / count as f64, 3));
         }
     }
     let (_, pose, _) = best
@@ -130,23 +149,4 @@ fn score(
         }
     }
     Some((sum, inliers))
-}
-
-/// Samples of three until one has no outlier.
-fn samples_for(share: f64, options: &RansacOptions) -> u32 {
-    let failure = 1.0 - share.powi(3);
-    if failure <= 0.0 {
-        return 1;
-    }
-    let needed = libm::log(1.0 - options.confidence) / libm::log(failure);
-    if needed.is_nan() || needed >= f64::from(options.most_samples) {
-        return options.most_samples;
-    }
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "between one and most_samples"
-    )]
-    let needed = needed.ceil().max(1.0) as u32;
-    needed
 }

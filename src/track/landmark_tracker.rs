@@ -11,9 +11,10 @@ use super::options::Setting;
 use super::point_landmark::{PendingPoint, PointLandmark, View};
 use super::sighting::{LineSighting, PointSighting, sightings};
 use super::tracker::upper_triangle;
+use super::two_view_start::{TwoViewStart, Waiting};
 use super::{Error, FrameTrack, TrackState, Tracker, TrackerMap};
 use crate::geometry::{LineMatch, PointMatch, Pose};
-use crate::structure::{LineId, MapLine, MapPoint, MeasuredFrame, PointId};
+use crate::structure::{FrameId, LineId, MapLine, MapPoint, MeasuredFrame, PointId};
 
 /// A landmark that so many frames in a row contradict is measured anew.
 const MOST_CONTRADICTIONS: u32 = 5;
@@ -23,9 +24,6 @@ const MOST_PREDICTED: u32 = 30;
 
 /// With fewer matches than this there is nothing known in view, and the map goes on from the predicted pose.
 const FEW_MATCHES: usize = 3;
-
-/// With fewer numbers measured of known landmarks, new ones are taken sooner.
-const FEW_NUMBERS: usize = 30;
 
 /// How much of the map is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,6 +53,10 @@ pub(super) struct LandmarkTracker {
     predicted: u32,
     /// Whether any frame was tracked yet.
     ever_tracked: bool,
+    /// Frames that wait for a first map.
+    start: TwoViewStart,
+    /// What is known by now of frames that waited.
+    revised: Vec<(FrameId, FrameTrack)>,
 }
 
 /// What was measured in a frame, and what is known of it.
@@ -64,6 +66,12 @@ struct Seen<'a> {
     /// Places in `points` and `lines` of what is matched.
     point_places: Vec<usize>,
     line_places: Vec<usize>,
+}
+
+impl<'a> Seen<'a> {
+    fn new(points: &'a [PointSighting], lines: &'a [LineSighting]) -> Self {
+        Self { points, lines, point_places: Vec::new(), line_places: Vec::new() }
+    }
 }
 
 impl LandmarkTracker {
@@ -81,6 +89,8 @@ impl LandmarkTracker {
             covariance: Matrix6::zeros(),
             predicted: 0,
             ever_tracked: false,
+            start: TwoViewStart::default(),
+            revised: Vec::new(),
         }
     }
 
@@ -110,7 +120,7 @@ impl LandmarkTracker {
         let agrees = |flags: Option<&Vec<bool>>, places: &[usize], place: usize| {
             flags.and_then(|flags| places.binary_search(&place).ok().map(|at| flags[at]))
         };
-        let starving = alignment.is_none_or(|alignment| alignment.numbers < FEW_NUMBERS);
+        let numbers = alignment.map_or(0, |alignment| alignment.numbers);
         // After a predicted frame, the last one that was tracked still counts.
         if self.memory == Memory::LastFrame && alignment.is_some() {
             self.past_points.append(&mut self.points);
@@ -138,7 +148,7 @@ impl LandmarkTracker {
                 self.pending_points.remove(&sighting.id);
             }
             let landmark = PointLandmark::from_depth(view, sighting)
-                .or_else(|| self.pending_points.entry(sighting.id).or_default().push(view, sighting, starving));
+                .or_else(|| self.pending_points.entry(sighting.id).or_default().push(view, sighting, numbers));
             if let Some(landmark) = landmark {
                 self.points.insert(sighting.id, landmark);
                 if self.memory == Memory::Whole {
@@ -165,7 +175,7 @@ impl LandmarkTracker {
                 self.pending_lines.remove(&sighting.id);
             }
             let landmark = LineLandmark::from_depth(view, sighting)
-                .or_else(|| self.pending_lines.entry(sighting.id).or_default().push(view, sighting, starving));
+                .or_else(|| self.pending_lines.entry(sighting.id).or_default().push(view, sighting, numbers));
             if let Some(landmark) = landmark {
                 self.lines.insert(sighting.id, landmark);
                 if self.memory == Memory::Whole {
@@ -173,6 +183,142 @@ impl LandmarkTracker {
                 }
             }
         }
+    }
+
+    /// Whether nothing is known to track against.
+    fn is_empty(&self) -> bool {
+        self.points.is_empty() && self.lines.is_empty()
+    }
+
+    /// Makes the first map of two views, and tracks the frames between them.
+    fn begin(&mut self, camera_from_world: Pose, predicted: &Pose, seed: u64) -> FrameTrack {
+        let frames = self.start.take();
+        self.pending_points.clear();
+        self.pending_lines.clear();
+        if let (Some(first), Some(last)) = (frames.first(), frames.last()) {
+            self.learn(&first.at(first.view.camera_from_world), &Seen::new(&first.points, &first.lines), None);
+            self.learn(&last.at(camera_from_world), &Seen::new(&last.points, &last.lines), None);
+        }
+        let mut track = None;
+        let mut near = frames.first().map_or(*predicted, |first| first.view.camera_from_world.inverse());
+        self.motion = Motion::default();
+        for (place, frame) in frames.iter().enumerate() {
+            if place == 0 {
+                self.motion.push(frame.stamp_nanos, near);
+                continue;
+            }
+            let last = place + 1 == frames.len();
+            let start = if last { camera_from_world.inverse() } else { near };
+            track = self.follow(frame, &start, seed);
+            match &track {
+                Some(track) => {
+                    near = track.world_from_camera;
+                    if !last {
+                        self.revised.push((frame.frame_id, *track));
+                    }
+                }
+                None => self.motion.push(frame.stamp_nanos, near),
+            }
+        }
+        track.unwrap_or_else(|| match frames.last() {
+            Some(last) => self.guess(last, &camera_from_world.inverse()),
+            None => FrameTrack {
+                state: TrackState::Predicted,
+                world_from_camera: *predicted,
+                covariance: None,
+                matched: [0, 0],
+                inliers: [0, 0],
+                residual_rms: None,
+            },
+        })
+    }
+
+    /// The pose of a frame against what is known, which then takes its measurements; `None` where they do not tell it.
+    fn follow(&mut self, frame: &Waiting, predicted: &Pose, seed: u64) -> Option<FrameTrack> {
+        let mut seen = Seen::new(&frame.points, &frame.lines);
+        let (points, lines) = self.matches(&mut seen);
+        let matches = Matches {
+            camera: &frame.view.camera,
+            sigma_px: frame.view.sigma_px,
+            points: &points,
+            lines: &lines,
+        };
+        let found = matches.align(&predicted.inverse(), seed)?;
+        let world_from_camera = found.camera_from_world.inverse();
+        let adjoint = world_from_camera.adjoint();
+        let of_frame = adjoint * found.covariance * adjoint.transpose();
+        self.covariance = match self.memory {
+            Memory::LastFrame => self.covariance + of_frame,
+            Memory::Whole => of_frame,
+        };
+        let covariance = self.view_covariance(&found.camera_from_world, &self.covariance);
+        let view = View { camera_from_world: found.camera_from_world, covariance, ..frame.view };
+        self.learn(&view, &seen, Some(&found));
+        if self.predicted > 0 {
+            self.motion.restart(frame.stamp_nanos, world_from_camera);
+        } else {
+            self.motion.push(frame.stamp_nanos, world_from_camera);
+        }
+        self.predicted = 0;
+        self.ever_tracked = true;
+        let agree = |flags: &[bool]| flags.iter().filter(|agrees| **agrees).count();
+        Some(FrameTrack {
+            state: TrackState::Tracked,
+            world_from_camera,
+            covariance: Some(self.covariance),
+            matched: [points.len(), lines.len()],
+            inliers: [agree(&found.points), agree(&found.lines)],
+            residual_rms: Some(found.residual_rms),
+        })
+    }
+
+    /// A frame whose measurements do not tell its pose.
+    fn guess(&mut self, frame: &Waiting, predicted: &Pose) -> FrameTrack {
+        let mut seen = Seen::new(&frame.points, &frame.lines);
+        let (points, lines) = self.matches(&mut seen);
+        let matched = [points.len(), lines.len()];
+        self.predicted += 1;
+        let last = self.motion.last().unwrap_or(*predicted);
+        self.covariance = self.predicted_covariance(&last, predicted);
+        self.motion.push(frame.stamp_nanos, *predicted);
+        let few = matched[0] + matched[1] < FEW_MATCHES;
+        if few && !self.ever_tracked {
+            // Nothing joins the first frame to this one: the map begins here.
+            self.points.clear();
+            self.lines.clear();
+        }
+        if self.memory == Memory::LastFrame || few {
+            let covariance = self.view_covariance(&predicted.inverse(), &self.covariance);
+            let view = View { camera_from_world: predicted.inverse(), covariance, ..frame.view };
+            self.learn(&view, &seen, None);
+        }
+        let state = if self.predicted > MOST_PREDICTED { TrackState::Lost } else { TrackState::Predicted };
+        FrameTrack {
+            state,
+            world_from_camera: *predicted,
+            covariance: Some(self.covariance),
+            matched,
+            inliers: [0, 0],
+            residual_rms: None,
+        }
+    }
+
+    /// What a frame's measurements find in the map.
+    fn matches(&self, seen: &mut Seen<'_>) -> (Vec<PointMatch>, Vec<LineMatch>) {
+        let (mut points, mut lines) = (Vec::new(), Vec::new());
+        for (place, sighting) in seen.points.iter().enumerate() {
+            if let Some(landmark) = self.points.get(&sighting.id) {
+                seen.point_places.push(place);
+                points.push(landmark.matched(sighting));
+            }
+        }
+        for (place, sighting) in seen.lines.iter().enumerate() {
+            if let Some(landmark) = self.lines.get(&sighting.id) {
+                seen.line_places.push(place);
+                lines.push(landmark.matched(sighting));
+            }
+        }
+        (points, lines)
     }
 }
 
@@ -184,94 +330,49 @@ impl Tracker for LandmarkTracker {
             .get(&frame.camera_id)
             .ok_or(Error::UnknownCamera { frame: frame.frame_id, camera: frame.camera_id })?;
         let (points, lines) = sightings(frame, &noise);
-        let mut seen =
-            Seen { points: &points, lines: &lines, point_places: Vec::new(), line_places: Vec::new() };
-        let sigma_px = noise.sigma_px;
-        let view = |world_from_camera: &Pose, covariance: Matrix6<f64>| View {
-            camera,
-            sigma_px,
-            camera_from_world: world_from_camera.inverse(),
-            covariance,
+        let predicted = self.motion.predict(frame.stamp_nanos);
+        let pose = predicted.unwrap_or(self.setting.first);
+        let at = Waiting {
+            frame_id: frame.frame_id,
+            stamp_nanos: frame.stamp_nanos,
+            view: View {
+                camera,
+                sigma_px: noise.sigma_px,
+                camera_from_world: pose.inverse(),
+                covariance: Matrix6::zeros(),
+            },
+            points,
+            lines,
         };
-        let Some(predicted) = self.motion.predict(frame.stamp_nanos) else {
-            let first = self.setting.first;
-            self.motion.push(frame.stamp_nanos, first);
-            self.learn(&view(&first, Matrix6::zeros()), &seen, None);
+        if predicted.is_none() {
+            self.motion.push(frame.stamp_nanos, pose);
+            self.learn(&at.view, &Seen::new(&at.points, &at.lines), None);
+            if self.is_empty() {
+                self.start.push(at, 0);
+            }
             return Ok(FrameTrack {
                 state: TrackState::Gauge,
-                world_from_camera: first,
+                world_from_camera: pose,
                 covariance: Some(Matrix6::zeros()),
                 matched: [0, 0],
                 inliers: [0, 0],
                 residual_rms: None,
             });
-        };
-        let (mut point_matches, mut line_matches): (Vec<PointMatch>, Vec<LineMatch>) = (Vec::new(), Vec::new());
-        for (place, sighting) in points.iter().enumerate() {
-            if let Some(landmark) = self.points.get(&sighting.id) {
-                seen.point_places.push(place);
-                point_matches.push(landmark.matched(sighting));
-            }
         }
-        for (place, sighting) in lines.iter().enumerate() {
-            if let Some(landmark) = self.lines.get(&sighting.id) {
-                seen.line_places.push(place);
-                line_matches.push(landmark.matched(sighting));
-            }
-        }
-        let matched = [point_matches.len(), line_matches.len()];
-        let matches = Matches { camera: &camera, sigma_px, points: &point_matches, lines: &line_matches };
         let seed = self.setting.seed ^ frame.frame_id.0.cast_unsigned().wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        if let Some(found) = matches.align(&predicted.inverse(), seed) {
-            let world_from_camera = found.camera_from_world.inverse();
-            let adjoint = world_from_camera.adjoint();
-            let of_frame = adjoint * found.covariance * adjoint.transpose();
-            self.covariance = match self.memory {
-                Memory::LastFrame => self.covariance + of_frame,
-                Memory::Whole => of_frame,
-            };
-            let covariance = self.view_covariance(&found.camera_from_world, &self.covariance);
-            self.learn(&view(&world_from_camera, covariance), &seen, Some(&found));
-            if self.predicted > 0 {
-                self.motion.restart(frame.stamp_nanos, world_from_camera);
-            } else {
-                self.motion.push(frame.stamp_nanos, world_from_camera);
+        if self.is_empty() && !self.ever_tracked {
+            if let Some(camera_from_world) = self.start.push(at.clone(), seed) {
+                return Ok(self.begin(camera_from_world, &pose, seed));
             }
-            self.predicted = 0;
-            self.ever_tracked = true;
-            let agree = |flags: &[bool]| flags.iter().filter(|agrees| **agrees).count();
-            return Ok(FrameTrack {
-                state: TrackState::Tracked,
-                world_from_camera,
-                covariance: Some(self.covariance),
-                matched,
-                inliers: [agree(&found.points), agree(&found.lines)],
-                residual_rms: Some(found.residual_rms),
-            });
         }
-        self.predicted += 1;
-        let last = self.motion.last().unwrap_or(predicted);
-        self.covariance = self.predicted_covariance(&last, &predicted);
-        self.motion.push(frame.stamp_nanos, predicted);
-        let few = matched[0] + matched[1] < FEW_MATCHES;
-        if few && !self.ever_tracked {
-            // Nothing joins the first frame to this one: the map begins here.
-            self.points.clear();
-            self.lines.clear();
+        if let Some(track) = self.follow(&at, &pose, seed) {
+            return Ok(track);
         }
-        if self.memory == Memory::LastFrame || few {
-            let covariance = self.view_covariance(&predicted.inverse(), &self.covariance);
-            self.learn(&view(&predicted, covariance), &seen, None);
-        }
-        let state = if self.predicted > MOST_PREDICTED { TrackState::Lost } else { TrackState::Predicted };
-        Ok(FrameTrack {
-            state,
-            world_from_camera: predicted,
-            covariance: Some(self.covariance),
-            matched,
-            inliers: [0, 0],
-            residual_rms: None,
-        })
+        Ok(self.guess(&at, &pose))
+    }
+
+    fn revised(&self) -> Vec<(FrameId, FrameTrack)> {
+        self.revised.clone()
     }
 
     fn map(&self) -> TrackerMap {

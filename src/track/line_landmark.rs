@@ -164,12 +164,12 @@ pub(super) struct PendingLine {
 impl PendingLine {
     /// Takes a measurement; gives the line where it is known well enough by now.
     ///
-    /// * `starving` — whether there is little else to track against.
+    /// * `numbers` — that were measured of landmarks that are known.
     pub(super) fn push(
         &mut self,
         view: &View,
         sighting: &LineSighting,
-        starving: bool,
+        numbers: usize,
     ) -> Option<LineLandmark> {
         if self.views.len() >= MOST_VIEWS {
             let mut keep = false;
@@ -188,7 +188,7 @@ impl PendingLine {
         if widest > 1.0 - 0.5 * LEAST_PARALLAX * LEAST_PARALLAX {
             return None;
         }
-        self.triangulated(most_doubt(starving))
+        self.triangulated(most_doubt(numbers))
     }
 
     fn triangulated(&self, most_doubt: f64) -> Option<LineLandmark> {

@@ -29,6 +29,7 @@ mod options;
 mod point_landmark;
 mod sighting;
 mod tracker;
+mod two_view_start;
 
 pub use error::Error;
 pub use options::{Method, Sensor, TrackOptions};

@@ -77,8 +77,10 @@ impl PointLandmark {
 
 /// How doubtful a triangulated landmark may be, sigma over distance: more where little else is known, for a common error of the first
 /// ones, such as their scale, stays with all that follow.
-pub(super) const fn most_doubt(starving: bool) -> f64 {
-    if starving { 0.2 } else { 0.03 }
+///
+/// * `numbers` — that were measured of landmarks that are known.
+pub(super) fn most_doubt(numbers: usize) -> f64 {
+    0.03 + 0.17 * (1.0 - numbers as f64 / 60.0).max(0.0)
 }
 
 /// Where a point without depth was seen, until its place is known.
@@ -90,12 +92,12 @@ pub(super) struct PendingPoint {
 impl PendingPoint {
     /// Takes a measurement; gives the point where it is known well enough by now.
     ///
-    /// * `starving` — whether there is little else to track against.
+    /// * `numbers` — that were measured of landmarks that are known.
     pub(super) fn push(
         &mut self,
         view: &View,
         sighting: &PointSighting,
-        starving: bool,
+        numbers: usize,
     ) -> Option<PointLandmark> {
         if self.views.len() >= MOST_VIEWS {
             let mut keep = false;
@@ -114,7 +116,7 @@ impl PendingPoint {
         if widest > 1.0 - 0.5 * LEAST_PARALLAX * LEAST_PARALLAX {
             return None;
         }
-        self.triangulated(most_doubt(starving))
+        self.triangulated(most_doubt(numbers))
     }
 
     fn triangulated(&self, most_doubt: f64) -> Option<PointLandmark> {

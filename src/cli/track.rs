@@ -11,7 +11,9 @@ use serde_json::json;
 use super::progress::Progress;
 use super::{Outcome, extended, text};
 use crate::geometry::Pose;
-use crate::structure::{DepthNoise, Estimate, MeasuredFrame, MeasurementNoise, Sequence, TrackedFrame, registry};
+use crate::structure::{
+    DepthNoise, Estimate, MeasuredFrame, MeasurementNoise, Sequence, TrackedFrame, registry,
+};
 use crate::track::{self, Method, Sensor, TrackOptions};
 
 /// What a frame is aligned to.
@@ -140,7 +142,8 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     let mut tracker = args.options(sensor)?.tracker(&sequence.manifest.cameras, noise, first)?;
     let progress = Progress::new("tracking", "frames");
     let begun = Instant::now();
-    let estimate = track::track(&frames, &name, tracker.as_mut(), &|done, total| progress.update(done, total))?;
+    let estimate =
+        track::track(&frames, &name, tracker.as_mut(), &|done, total| progress.update(done, total))?;
     let seconds = begun.elapsed().as_secs_f64();
     drop(progress);
     let count = |state: &str| estimate.tracking.iter().filter(|row| row.state == state).count();

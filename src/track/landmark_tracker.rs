@@ -147,8 +147,9 @@ impl LandmarkTracker {
                 // Whichever of the two frames was wrong, its past leads nowhere.
                 self.pending_points.remove(&sighting.id);
             }
-            let landmark = PointLandmark::from_depth(view, sighting)
-                .or_else(|| self.pending_points.entry(sighting.id).or_default().push(view, sighting, numbers));
+            let landmark = PointLandmark::from_depth(view, sighting).or_else(|| {
+                self.pending_points.entry(sighting.id).or_default().push(view, sighting, numbers)
+            });
             if let Some(landmark) = landmark {
                 self.points.insert(sighting.id, landmark);
                 if self.memory == Memory::Whole {
@@ -196,7 +197,11 @@ impl LandmarkTracker {
         self.pending_points.clear();
         self.pending_lines.clear();
         if let (Some(first), Some(last)) = (frames.first(), frames.last()) {
-            self.learn(&first.at(first.view.camera_from_world), &Seen::new(&first.points, &first.lines), None);
+            self.learn(
+                &first.at(first.view.camera_from_world),
+                &Seen::new(&first.points, &first.lines),
+                None,
+            );
             self.learn(&last.at(camera_from_world), &Seen::new(&last.points, &last.lines), None);
         }
         let mut track = None;
@@ -282,7 +287,7 @@ impl LandmarkTracker {
         self.covariance = self.predicted_covariance(&last, predicted);
         self.motion.push(frame.stamp_nanos, *predicted);
         let few = matched[0] + matched[1] < FEW_MATCHES;
-        if few && !self.ever_tracked {
+        if few && !self.ever_tracked && frame.points.len() + frame.lines.len() > FEW_MATCHES {
             // Nothing joins the first frame to this one: the map begins here.
             self.points.clear();
             self.lines.clear();

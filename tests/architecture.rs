@@ -306,7 +306,7 @@ const PLATFORM_MATHS: &[&str] = &[
 #[test]
 fn what_is_written_is_computed_the_same_on_every_machine() {
     let mut wrong = Vec::new();
-    for folder in ["src/geometry", "src/structure", "src/simulate", "src/statistics"] {
+    for folder in ["src/geometry", "src/structure", "src/simulate", "src/statistics", "src/track"] {
         for (path, text) in files(folder) {
             if path.contains("/tests") || path.ends_with("strategies.rs") {
                 continue;

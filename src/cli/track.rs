@@ -44,6 +44,7 @@ enum SensorName {
 ///
 /// The output is the input with the estimate added: trajectories, map and what happened in each frame (table `tracking`).
 #[derive(clap::Args, Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command")]
 #[command(after_help = "Examples:
   os track box1 -o tracked --name ours
   os track box1.mcap -o tracked.mcap --method frame-to-frame --replace
@@ -198,7 +199,7 @@ fn has_depth(sequence: &Sequence) -> bool {
 fn true_first_pose(sequence: &Sequence, frames: &[MeasuredFrame]) -> anyhow::Result<Pose> {
     let Some(first) = frames.first() else { return Ok(Pose::identity()) };
     let truth = sequence.frames.iter().find(|frame| frame.frame_id == first.frame_id);
-    match truth.and_then(|frame| frame.world_from_camera()) {
+    match truth.and_then(Frame::world_from_camera) {
         Some(row) => row.pose().with_context(|| format!("frames: the true pose of {}", first.frame_id)),
         None => Ok(Pose::identity()),
     }

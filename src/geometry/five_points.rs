@@ -153,8 +153,8 @@ fn cubics(basis: &[Matrix3<f64>; 4]) -> SMatrix<f64, 10, 20> {
     let mut square = [[Polynomial::ZERO; 3]; 3];
     for (i, row) in square.iter_mut().enumerate() {
         for (j, entry) in row.iter_mut().enumerate() {
-            for k in 0..3 {
-                *entry = entry.plus(&e[i][k].times(&e[j][k]), 1.0);
+            for (mine, theirs) in e[i].iter().zip(&e[j]) {
+                *entry = entry.plus(&mine.times(theirs), 1.0);
             }
         }
     }
@@ -166,14 +166,11 @@ fn cubics(basis: &[Matrix3<f64>; 4]) -> SMatrix<f64, 10, 20> {
         }
     };
     put(9, &determinant);
-    for i in 0..3 {
-        for j in 0..3 {
-            let mut sum = trace.times(&e[i][j]);
-            for factor in &mut sum.0 {
-                *factor = -*factor;
-            }
-            for k in 0..3 {
-                sum = sum.plus(&square[i][k].times(&e[k][j]), 2.0);
+    for (i, row) in e.iter().enumerate() {
+        for (j, entry) in row.iter().enumerate() {
+            let mut sum = Polynomial::ZERO.plus(&trace.times(entry), -1.0);
+            for (in_square, below) in square[i].iter().zip(&e) {
+                sum = sum.plus(&in_square.times(&below[j]), 2.0);
             }
             put(3 * i + j, &sum);
         }

@@ -22,8 +22,10 @@ const MOST_CONTRADICTIONS: u32 = 5;
 /// After so many predicted frames in a row nobody knows where the camera is.
 const MOST_PREDICTED: u32 = 30;
 
-/// With fewer matches than this there is nothing known in view, and the map goes on from the predicted pose.
+/// With fewer matches than this, or than this part of what was measured, there is hardly anything known in view: where they do not tell the
+/// pose, the map goes on from the predicted one.
 const FEW_MATCHES: usize = 3;
+const FEW_SHARE: usize = 4;
 
 /// How much of the map is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -286,8 +288,9 @@ impl LandmarkTracker {
         let last = self.motion.last().unwrap_or(*predicted);
         self.covariance = self.predicted_covariance(&last, predicted);
         self.motion.push(frame.stamp_nanos, *predicted);
-        let few = matched[0] + matched[1] < FEW_MATCHES;
-        if few && !self.ever_tracked && frame.points.len() + frame.lines.len() > FEW_MATCHES {
+        let measured = frame.points.len() + frame.lines.len();
+        let few = matched[0] + matched[1] < FEW_MATCHES.max(measured / FEW_SHARE);
+        if few && !self.ever_tracked && measured > FEW_MATCHES {
             // Nothing joins the first frame to this one: the map begins here.
             self.points.clear();
             self.lines.clear();
@@ -365,10 +368,11 @@ impl Tracker for LandmarkTracker {
             });
         }
         let seed = self.setting.seed ^ frame.frame_id.0.cast_unsigned().wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        if self.is_empty() && !self.ever_tracked {
-            if let Some(camera_from_world) = self.start.push(at.clone(), seed) {
-                return Ok(self.begin(camera_from_world, &pose, seed));
-            }
+        if self.is_empty()
+            && !self.ever_tracked
+            && let Some(camera_from_world) = self.start.push(at.clone(), seed)
+        {
+            return Ok(self.begin(camera_from_world, &pose, seed));
         }
         if let Some(track) = self.follow(&at, &pose, seed) {
             return Ok(track);

@@ -1,12 +1,15 @@
 //! Measurements instead of images: the Open-Structure format, its validator and its tools.
 
+pub mod adjust;
 #[cfg(feature = "archive")]
 pub mod archive;
+pub mod benchmark;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod covisibility;
 pub mod datasets;
 pub mod evaluate;
+pub mod exchange;
 #[cfg(feature = "fetch")]
 pub mod fetch;
 pub mod format;

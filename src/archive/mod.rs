@@ -23,6 +23,7 @@ mod tar_archive;
 mod temporary;
 mod unpack;
 mod zip_archive;
+mod zipped;
 
 #[cfg(test)]
 mod tests;
@@ -33,3 +34,4 @@ pub use kind::Kind;
 pub use limits::Limits;
 pub use temporary::Temporary;
 pub use unpack::{Selection, Unpacked, extract, unpack};
+pub use zipped::zipped;

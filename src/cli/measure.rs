@@ -107,7 +107,7 @@ fn seeds(text: &str) -> Result<RangeInclusive<u64>, String> {
     Ok(first..=last)
 }
 
-fn assignment(text: &str) -> Result<(String, f64), String> {
+pub(super) fn assignment(text: &str) -> Result<(String, f64), String> {
     let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE, such as sigma_px=0.5")?;
     let value = value.parse().map_err(|_| format!("expected a number after {name}="))?;
     Ok((name.to_owned(), value))

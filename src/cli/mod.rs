@@ -1,15 +1,24 @@
 //! The command line: arguments in, calls to the rooms below, rendering out.
 
+mod adjust;
+mod benchmark;
 mod cat;
 mod chart;
 mod completions;
 mod convert;
 mod copy;
+mod evaluate;
+mod evaluate_files;
+mod evaluate_output;
+mod evaluate_shown;
 mod explain;
+mod export;
 mod extended;
 mod fetch;
 mod fetch_progress;
 mod graph;
+mod import;
+mod import_trajectory;
 mod info;
 mod left_behind;
 mod man;
@@ -56,10 +65,16 @@ enum Command {
     Simulate(simulate::Args),
     Measure(measure::Args),
     Graph(graph::Args),
+    Benchmark(benchmark::Args),
     Track(track::Args),
+    Adjust(adjust::Args),
     Stats(stats::Args),
+    Evaluate(evaluate::Args),
     Plot(plot::Args),
     Schema(schema::Args),
+    Export(export::Args),
+    Import(import::Args),
+    ImportTrajectory(import_trajectory::Args),
     Fetch(fetch::Args),
     Convert(convert::Args),
     Completions(completions::Args),
@@ -95,11 +110,17 @@ pub fn main() -> ExitCode {
         Command::Copy(args) => copy::run(args, &mut stdout),
         Command::Simulate(args) => simulate::run(args, &mut stdout),
         Command::Measure(args) => measure::run(args, &mut stdout),
+        Command::Evaluate(args) => evaluate::run(args, &mut stdout),
         Command::Graph(args) => graph::run(args, &mut stdout),
         Command::Track(args) => track::run(args, &mut stdout),
+        Command::Benchmark(args) => benchmark::run(args, &mut stdout),
+        Command::Adjust(args) => adjust::run(args, &mut stdout),
         Command::Plot(args) => plot::run(args, &mut stdout),
         Command::Stats(args) => stats::run(args, &mut stdout),
         Command::Schema(args) => schema::run(args, &mut stdout),
+        Command::Export(args) => export::run(args, &mut stdout),
+        Command::Import(args) => import::run(args, &mut stdout),
+        Command::ImportTrajectory(args) => import_trajectory::run(args, &mut stdout),
         Command::Fetch(args) => fetch::run(args, &mut stdout),
         Command::Convert(args) => convert::run(args),
         Command::Completions(args) => completions::run(args, &mut stdout),

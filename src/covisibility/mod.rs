@@ -12,6 +12,9 @@ mod pose_graph;
 mod relative_pose;
 mod reprojection_graph;
 
+#[cfg(test)]
+mod tests;
+
 pub use error::Error;
 pub use options::{GraphOptions, KeyFrameRule, LoopRule};
 pub use pose_graph::{PoseGraphSummary, pose_graph};

@@ -110,7 +110,8 @@ mod tests {
             let found = absolute(&path, &path, Alignment::NONE).unwrap();
             for relation in Relation::ALL {
                 if let Ok(errors) = found.errors(relation) {
-                    prop_assert_eq!(errors.statistics().max, 0.0);
+                    // Products whose sum is zero are added in some order.
+                    prop_assert!(errors.statistics().max < 1e-13);
                 }
             }
             let found = absolute(&path, &moved(&path, &by), Alignment::SIM3).unwrap();

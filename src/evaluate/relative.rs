@@ -151,7 +151,9 @@ mod tests {
         fn a_path_moves_as_itself(path in path()) {
             let found = relative(&path, &path, Alignment::NONE, Step::FRAME).unwrap();
             for relation in Relation::ALL {
-                prop_assert_eq!(found.errors(relation).unwrap().statistics().max, 0.0);
+                // A path that stands still has no ratio; products whose sum is zero are added in some order.
+                let most = found.errors(relation).map_or(0.0, |errors| errors.statistics().max);
+                prop_assert!(most < 1e-13, "{relation:?}: {most}");
             }
         }
     }

@@ -8,7 +8,7 @@ use crate::structure::{FrameId, ResultTable};
 /// An evaluation with the names that tell it apart from others.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Evaluated {
-    /// Name of the sequence, or of the estimate's file.
+    /// Name of the sequence's file or folder, or of the reference's file.
     pub sequence: String,
     /// Name of the reference.
     pub reference: String,
@@ -53,7 +53,7 @@ pub fn summary_table(rows: &[Evaluated], relations: &[Relation]) -> ResultTable 
     let mut table = ResultTable::new("evaluation")
         .text(
             "sequence",
-            "name of the sequence, or of the estimate's file",
+            "name of the sequence's file or folder, or of the reference's file",
             rows.iter().map(|row| Some(&row.sequence)),
         )
         .text("estimate", "name of the estimate", rows.iter().map(|row| Some(&row.evaluation.name)))
@@ -243,7 +243,7 @@ pub fn per_frame_table(rows: &[(&Evaluated, &BTreeMap<FrameId, i64>)]) -> Result
     let mut table = ResultTable::new("frame_errors")
         .text(
             "sequence",
-            "name of the sequence, or of the estimate's file",
+            "name of the sequence's file or folder, or of the reference's file",
             frames.iter().map(|f| Some(&f.row.sequence)),
         )
         .text("estimate", "name of the estimate", frames.iter().map(|f| Some(&f.row.evaluation.name)))

@@ -47,7 +47,7 @@ pub(crate) use mcap_survey::{Faults, McapSurvey, survey_file};
 pub(crate) use partial::Partial;
 pub use partial::discard_unfinished;
 pub use reader::{SequenceReader, open, read};
-pub use results::{read_results, write_results};
+pub use results::{read_results, write_results, write_text};
 pub use stored_table::StoredTable;
 pub use two_pass::{Chunk, Outline, Realisation, Tally, write_realisations, write_two_pass};
 pub use writer::{FrameRows, SequenceWriter, WriteOptions, Written, write};

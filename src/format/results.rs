@@ -53,6 +53,16 @@ pub fn write_results(path: &Path, table: &ResultTable, force: bool) -> Result<()
     partial.finish()
 }
 
+/// Writes a text file as outputs are written: under a temporary name first.
+///
+/// # Errors
+/// [`Error::Exists`] when something is there and `force` is not given, and [`Error::Io`].
+pub fn write_text(path: &Path, text: &str, force: bool) -> Result<(), Error> {
+    let partial = Partial::new(path, force)?;
+    partial.create_file()?.write_all(text.as_bytes()).map_err(Error::io(partial.path()))?;
+    partial.finish()
+}
+
 fn array(values: &ResultValues) -> ArrayRef {
     match values {
         ResultValues::Text(values) => Arc::new(StringArray::from(values.clone())),

@@ -1,15 +1,24 @@
-//! Pictures of sequences, as SVG: a scene with its trajectory, and statistics over frames.
+//! Pictures of sequences, as SVG: a scene with its trajectory, statistics over frames, errors of estimates, convergence.
 
+mod axis;
+mod chart;
+mod curves_figure;
 mod error;
+mod evaluation_figure;
+mod heat;
 mod scene;
 mod statistics_figure;
 mod svg;
+mod trajectory_figure;
 mod view;
 
+pub use curves_figure::{ErrorCurve, NamedNumbers, convergence_figure, error_figure, histogram_figure};
 pub use error::Error;
+pub use evaluation_figure::{EvaluatedEstimate, evaluation_figure};
 pub use scene::{Scene, scene_picture};
 pub use statistics_figure::statistics_figure;
-pub use view::ViewFrom;
+pub use trajectory_figure::{ComparedPath, trajectory_figure};
+pub use view::{ViewFrom, upward};
 
 /// Background, so that a picture is readable on a dark page too.
 const PAPER: &str = "#ffffff";

@@ -86,6 +86,22 @@ impl Svg {
         }
     }
 
+    /// Adds strokes with dashes, such as `8 3`; without any where `dashes` is empty.
+    pub(super) fn dashed<'a>(
+        &mut self,
+        strokes: impl Iterator<Item = &'a [[f64; 2]]>,
+        width: f64,
+        colour: &str,
+        dashes: &str,
+    ) {
+        if dashes.is_empty() {
+            return self.strokes(strokes, width, colour, 1.0);
+        }
+        self.element(&format!("<g stroke-dasharray=\"{dashes}\">"));
+        self.strokes(strokes, width, colour, 1.0);
+        self.element("</g>");
+    }
+
     /// Adds a line of text; `anchor` is `start`, `middle` or `end`.
     pub(super) fn words(&mut self, [x, y]: [f64; 2], size: f64, anchor: &str, colour: &str, words: &str) {
         self.element(&format!(

@@ -55,7 +55,8 @@ impl Plane {
 }
 
 /// The axis of `world` that points up: the one that the cameras' upward directions are nearest to; z without poses.
-pub(super) fn upward(cameras: &[Camera], frames: &[Frame]) -> Vector3<f64> {
+#[must_use]
+pub fn upward(cameras: &[Camera], frames: &[Frame]) -> Vector3<f64> {
     let mut sum = Vector3::zeros();
     for frame in frames {
         let Some(Ok(pose)) = frame.world_from_camera().map(|pose| pose.pose()) else { continue };

@@ -16,6 +16,9 @@ pub const PIXEL_CENTER: &str = "pixel-center";
 /// Pixel (0, 0) is the outer corner of the top-left pixel.
 pub const PIXEL_CORNER: &str = "pixel-corner";
 
+/// Removed distortion: k1, k2, p1, p2, k3 of the model that OpenCV uses.
+pub const BROWN_CONRADY: &str = "brown-conrady";
+
 /// Clock: the sensor's stamps.
 pub const RECORDED: &str = "recorded";
 /// Clock: stamps made from a frame rate.
@@ -142,7 +145,7 @@ pub const FAMILIES: &[Family] = &[
         name: "removed distortion",
         place: "manifest `cameras[].removed_distortion.model`",
         open: true,
-        values: &[("brown-conrady", "coefficients k1, k2, p1, p2, k3 of the model that OpenCV uses")],
+        values: &[(BROWN_CONRADY, "coefficients k1, k2, p1, p2, k3 of the model that OpenCV uses")],
     },
     Family {
         name: "clock",

@@ -1,0 +1,429 @@
+//! Levenberg-Marquardt and dog-leg: from a start to the nearest least cost.
+
+use super::error::Error;
+use super::normal_equations::NormalEquations;
+use super::problem::{Problem, Variable};
+
+/// How steps are kept within the trusted region.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Optimiser {
+    /// `(H + λ diag H) δ = −g`, λ by how well the last step kept its promise.
+    #[default]
+    LevenbergMarquardt,
+    /// Powell's dog-leg between the steepest descent and the Gauss-Newton step, in the norm of `diag H`.
+    DogLeg,
+}
+
+/// When to stop, and how to step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SolverOptions {
+    /// How steps are found.
+    pub optimiser: Optimiser,
+    /// Steps tried at most, rejected ones counted.
+    pub max_iterations: usize,
+    /// Stop when an accepted step lowers the cost by less than this part of it.
+    pub function_tolerance: f64,
+    /// Stop when no entry of the gradient `Jᵀr` is larger.
+    pub gradient_tolerance: f64,
+    /// Stop when a step in units of `√diag H` (how far it moves residuals, in sigma) is shorter than this times the root of the number of
+    /// unknowns.
+    pub step_tolerance: f64,
+    /// Stop at this cost, which only data without noise reaches.
+    pub cost_tolerance: f64,
+    /// Damping at the start, relative to the diagonal.
+    pub damping: f64,
+}
+
+impl Default for SolverOptions {
+    fn default() -> Self {
+        Self {
+            optimiser: Optimiser::default(),
+            max_iterations: 200,
+            function_tolerance: 1e-9,
+            gradient_tolerance: 1e-9,
+            step_tolerance: 1e-9,
+            cost_tolerance: 1e-25,
+            damping: 1e-4,
+        }
+    }
+}
+
+/// Why an optimisation ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Ending {
+    /// The cost no longer falls: `function_tolerance`.
+    Cost,
+    /// The gradient vanished: `gradient_tolerance`.
+    Gradient,
+    /// The steps vanished: `step_tolerance`.
+    Step,
+    /// The cost vanished: `cost_tolerance`, or nothing is free.
+    Zero,
+    /// `max_iterations` steps were tried.
+    #[default]
+    Iterations,
+    /// No step lowers the cost, however short: what is left is rounding.
+    Stuck,
+}
+
+impl Ending {
+    /// Whether a least cost was reached.
+    #[must_use]
+    pub fn has_converged(self) -> bool {
+        self != Self::Iterations
+    }
+
+    /// The ending in words.
+    #[must_use]
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Cost => "converged: the cost no longer falls",
+            Self::Gradient => "converged: the gradient vanished",
+            Self::Step => "converged: the steps vanished",
+            Self::Zero => "converged: no cost is left",
+            Self::Iterations => "not converged: the most iterations were made",
+            Self::Stuck => "converged: no step lowers the cost",
+        }
+    }
+}
+
+/// One step that was tried.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Step {
+    /// Cost before it was tried, or after it if it was taken.
+    pub cost: f64,
+    /// How far it would lower the cost; negative where it would raise it, minus infinity where there is no cost.
+    pub decrease: f64,
+    /// Largest entry of the gradient from where it was tried.
+    pub gradient_max: f64,
+    /// Length of the step over all unknowns, radians and metres together.
+    pub step_norm: f64,
+    /// Damping λ (Levenberg-Marquardt), or the inverse of the trusted radius (dog-leg).
+    pub damping: f64,
+    /// Whether it was taken.
+    pub accepted: bool,
+}
+
+/// How an optimisation went.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct Minimum {
+    /// Why it ended.
+    pub ending: Ending,
+    /// Cost at the start.
+    pub initial_cost: f64,
+    /// Cost at the end.
+    pub final_cost: f64,
+    /// Every step that was tried; the first entry is the start.
+    pub steps: Vec<Step>,
+}
+
+/// Damping is kept above this, so that what the measurements leave open (a free scale) stays where it is.
+const LEAST_DAMPING: f64 = 1e-12;
+/// Damping above which no step helps.
+const MOST_DAMPING: f64 = 1e16;
+/// A step is taken when it keeps at least this part of its promise.
+const LEAST_PROMISE: f64 = 1e-4;
+
+/// Moves the variables of a problem to the nearest least cost.
+///
+/// Steps solve the normal equations by blocks; one set of variables that do not meet in a factor is eliminated first, the one that makes
+/// the rest cheapest. Levenberg-Marquardt: `λ` shrinks by `max(1/3, 1 − (2ϱ − 1)³)` after a step with gain ratio `ϱ`, and grows by
+/// 2, 4, 8, … after steps that were rejected (Nielsen). The result has the same bits on any number of threads.
+///
+/// # Errors
+/// [`Error::Start`] when the cost at the start is not finite, [`Error::TooLarge`], [`Error::Option`].
+pub fn minimise(problem: &mut Problem, options: &SolverOptions) -> Result<Minimum, Error> {
+    minimise_watched(problem, options, &mut |_| true)
+}
+
+/// As [`minimise`], telling each step to a watcher, who ends it by giving `false`.
+///
+/// # Errors
+/// Those of [`minimise`].
+pub fn minimise_watched(
+    problem: &mut Problem,
+    options: &SolverOptions,
+    watch: &mut dyn FnMut(&Step) -> bool,
+) -> Result<Minimum, Error> {
+    options.check()?;
+    let mut equations = NormalEquations::new(problem)?;
+    let mut cost = equations.linearise(problem);
+    if !cost.is_finite() {
+        return Err(Error::Start { found: cost });
+    }
+    let mut minimum = Minimum { initial_cost: cost, final_cost: cost, ..Minimum::default() };
+    minimum.steps.push(Step {
+        cost,
+        gradient_max: equations.gradient_max(),
+        accepted: true,
+        ..Step::default()
+    });
+    if equations.unknowns() == 0 {
+        minimum.ending = Ending::Zero;
+        return Ok(minimum);
+    }
+    if let Some(ending) = options.is_done_at(cost, equations.gradient_max()) {
+        minimum.ending = ending;
+        return Ok(minimum);
+    }
+    let mut region = Region::new(options, equations.unknowns());
+    let mut moved = problem.numbers.clone();
+    let mut residuals = vec![0.0; problem.layout.residuals];
+    let mut step = vec![0.0; equations.unknowns()];
+    let mut fresh = true;
+    for _ in 0..options.max_iterations {
+        let gradient_max = equations.gradient_max();
+        let mut tried = Step { cost, gradient_max, damping: region.damping(), ..Step::default() };
+        let promise = region.step(problem, &mut equations, fresh, &mut step);
+        fresh = false;
+        tried.decrease = f64::NEG_INFINITY;
+        let mut size = f64::INFINITY;
+        if let Some(promise) = promise {
+            tried.step_norm = step.iter().map(|s| s * s).sum::<f64>().sqrt();
+            size = scaled_norm(&step, equations.diagonal());
+            move_all(problem, &equations, &step, &mut moved);
+            let there = problem.evaluate(&moved, &mut residuals, None);
+            tried.decrease = cost - there;
+            let ratio = tried.decrease / promise;
+            // Near the end rounding decides whether the cost falls.
+            let rounding = 1e-14 * cost;
+            if tried.decrease > 0.0 && (ratio > LEAST_PROMISE || promise <= rounding) {
+                std::mem::swap(&mut problem.numbers, &mut moved);
+                cost = equations.linearise(problem);
+                tried.cost = cost;
+                tried.accepted = true;
+                region.succeed(ratio, size);
+                fresh = true;
+            } else {
+                region.fail(size);
+            }
+            if promise <= rounding && !tried.accepted {
+                minimum.steps.push(tried);
+                minimum.ending = Ending::Stuck;
+                break;
+            }
+        } else {
+            region.fail(f64::INFINITY);
+        }
+        minimum.steps.push(tried);
+        let ending = if tried.accepted {
+            let done = options.is_done_at(cost, equations.gradient_max());
+            let still = tried.decrease <= options.function_tolerance * cost;
+            done.or(still.then_some(Ending::Cost))
+        } else {
+            region.is_lost().then_some(Ending::Stuck)
+        };
+        let least_step = options.step_tolerance * (step.len() as f64).sqrt();
+        let ending = ending.or((size <= least_step).then_some(Ending::Step));
+        if let Some(ending) = ending {
+            minimum.ending = ending;
+            watch(&tried);
+            break;
+        }
+        if !watch(&tried) {
+            break;
+        }
+    }
+    minimum.final_cost = cost;
+    Ok(minimum)
+}
+
+impl SolverOptions {
+    fn check(&self) -> Result<(), Error> {
+        let tolerances = [
+            ("function_tolerance", self.function_tolerance),
+            ("gradient_tolerance", self.gradient_tolerance),
+            ("step_tolerance", self.step_tolerance),
+            ("cost_tolerance", self.cost_tolerance),
+        ];
+        for (option, found) in tolerances {
+            if !(found >= 0.0 && found.is_finite()) {
+                return Err(Error::Option { option, expected: "a number not below zero", found });
+            }
+        }
+        if !(self.damping > 0.0 && self.damping.is_finite()) {
+            return Err(Error::Option {
+                option: "damping",
+                expected: "a number over zero",
+                found: self.damping,
+            });
+        }
+        Ok(())
+    }
+
+    fn is_done_at(&self, cost: f64, gradient_max: f64) -> Option<Ending> {
+        if cost <= self.cost_tolerance {
+            Some(Ending::Zero)
+        } else if gradient_max <= self.gradient_tolerance {
+            Some(Ending::Gradient)
+        } else {
+            None
+        }
+    }
+}
+
+/// The length of a step in units of `√diag H`.
+fn scaled_norm(step: &[f64], diagonal: &[f64]) -> f64 {
+    step.iter().zip(diagonal).map(|(s, d)| s * s * d).sum::<f64>().sqrt()
+}
+
+/// Where all variables are after a step.
+fn move_all(problem: &Problem, equations: &NormalEquations, step: &[f64], moved: &mut [f64]) {
+    for index in 0..problem.len() {
+        let numbers = problem.start[index]..problem.start[index + 1];
+        match equations.step_of(index) {
+            Some(range) => {
+                let variable = Variable(u32::try_from(index).unwrap_or(u32::MAX));
+                let space = &problem.spaces[problem.space_of[variable.index()] as usize];
+                space.plus(&problem.numbers[numbers.clone()], &step[range], &mut moved[numbers]);
+            }
+            None => moved[numbers.clone()].copy_from_slice(&problem.numbers[numbers]),
+        }
+    }
+}
+
+/// What is trusted of the linear model.
+struct Region {
+    optimiser: Optimiser,
+    damping: f64,
+    growth: f64,
+    radius: f64,
+    /// The two steps between which a dog-leg goes.
+    newton: Vec<f64>,
+    descent: Vec<f64>,
+    has_newton: bool,
+    right: Vec<f64>,
+}
+
+impl Region {
+    fn new(options: &SolverOptions, unknowns: usize) -> Self {
+        let legs = if options.optimiser == Optimiser::DogLeg { unknowns } else { 0 };
+        Self {
+            optimiser: options.optimiser,
+            damping: options.damping,
+            growth: 2.0,
+            radius: f64::INFINITY,
+            newton: vec![0.0; legs],
+            descent: vec![0.0; legs],
+            has_newton: false,
+            right: vec![0.0; unknowns],
+        }
+    }
+
+    fn damping(&self) -> f64 {
+        match self.optimiser {
+            Optimiser::LevenbergMarquardt => self.damping,
+            Optimiser::DogLeg => 1.0 / self.radius,
+        }
+    }
+
+    /// Finds a step; gives the decrease of the cost that the linear model promises, `None` where there is no step.
+    fn step(
+        &mut self,
+        problem: &Problem,
+        equations: &mut NormalEquations,
+        fresh: bool,
+        step: &mut [f64],
+    ) -> Option<f64> {
+        for (right, gradient) in self.right.iter_mut().zip(equations.gradient()) {
+            *right = -gradient;
+        }
+        match self.optimiser {
+            Optimiser::LevenbergMarquardt => {
+                if !equations.factorise(self.damping) {
+                    return None;
+                }
+                equations.solve(&self.right, step);
+                let parts = step.iter().zip(equations.gradient()).zip(equations.diagonal());
+                // −gᵀδ − ½ δᵀHδ with Hδ = −g − λDδ.
+                let promise: f64 = parts.map(|((s, g), d)| 0.5 * s * (self.damping * d * s - g)).sum();
+                (promise.is_finite() && promise > 0.0).then_some(promise)
+            }
+            Optimiser::DogLeg => {
+                if fresh || !self.has_newton {
+                    self.legs(problem, equations)?;
+                }
+                self.bend(equations.diagonal(), step);
+                let slope: f64 = step.iter().zip(equations.gradient()).map(|(s, g)| s * g).sum();
+                let promise = -slope - 0.5 * equations.squared_change(problem, step);
+                (promise.is_finite() && promise > 0.0).then_some(promise)
+            }
+        }
+    }
+
+    /// Steepest descent and Gauss-Newton from here; the latter damped as little as it needs to be.
+    fn legs(&mut self, problem: &Problem, equations: &mut NormalEquations) -> Option<()> {
+        let mut damping = 1e-10;
+        while !equations.factorise(damping) {
+            damping *= 100.0;
+            if damping > 1.0 {
+                return None;
+            }
+        }
+        equations.solve(&self.right, &mut self.newton);
+        for ((descent, right), diagonal) in self.descent.iter_mut().zip(&self.right).zip(equations.diagonal())
+        {
+            *descent = right / diagonal;
+        }
+        let slope: f64 = self.descent.iter().zip(&self.right).map(|(d, r)| d * r).sum();
+        let change = equations.squared_change(problem, &self.descent);
+        let length = if change > 0.0 { slope / change } else { 0.0 };
+        self.descent.iter_mut().for_each(|d| *d *= length);
+        self.has_newton = self.newton.iter().chain(&self.descent).all(|entry| entry.is_finite());
+        if self.radius.is_infinite() {
+            // The first step is trusted as far as Gauss-Newton goes.
+            self.radius = scaled_norm(&self.newton, equations.diagonal());
+        }
+        self.has_newton.then_some(())
+    }
+
+    /// The point of the dog-leg at the trusted radius.
+    fn bend(&self, diagonal: &[f64], step: &mut [f64]) {
+        let newton = scaled_norm(&self.newton, diagonal);
+        let descent = scaled_norm(&self.descent, diagonal);
+        if newton <= self.radius {
+            step.copy_from_slice(&self.newton);
+        } else if descent >= self.radius {
+            let scale = self.radius / descent;
+            step.iter_mut().zip(&self.descent).for_each(|(step, d)| *step = d * scale);
+        } else {
+            // |descent + t (newton − descent)| = radius
+            let (mut a, mut b) = (0.0, 0.0);
+            for ((n, d), weight) in self.newton.iter().zip(&self.descent).zip(diagonal) {
+                a += weight * (n - d) * (n - d);
+                b += weight * d * (n - d);
+            }
+            let c = descent * descent - self.radius * self.radius;
+            let t = if a > 0.0 { -c / (b + (b * b - a * c).max(0.0).sqrt()) } else { 0.0 };
+            for ((step, n), d) in step.iter_mut().zip(&self.newton).zip(&self.descent) {
+                *step = d + t.clamp(0.0, 1.0) * (n - d);
+            }
+        }
+    }
+
+    /// After a step that was taken: its gain ratio, and its length in units of `√diag H`.
+    fn succeed(&mut self, ratio: f64, size: f64) {
+        let better = 2.0 * ratio - 1.0;
+        self.damping = (self.damping * (1.0 - better * better * better).max(1.0 / 3.0)).max(LEAST_DAMPING);
+        self.growth = 2.0;
+        if ratio > 0.75 {
+            self.radius = self.radius.max(3.0 * size);
+        } else if ratio < 0.25 {
+            self.radius *= 0.5;
+        }
+    }
+
+    /// After a step that was not.
+    fn fail(&mut self, size: f64) {
+        self.damping *= self.growth;
+        self.growth *= 2.0;
+        self.radius = 0.25 * self.radius.min(size);
+    }
+
+    fn is_lost(&self) -> bool {
+        match self.optimiser {
+            Optimiser::LevenbergMarquardt => self.damping > MOST_DAMPING,
+            Optimiser::DogLeg => self.radius < 1e-12 || self.radius.is_nan(),
+        }
+    }
+}

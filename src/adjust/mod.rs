@@ -1,0 +1,36 @@
+//! A factor graph into an estimate: bundle adjustment, structural adjustment and pose graphs.
+
+mod adjustment;
+mod block_pattern;
+mod elimination;
+mod error;
+mod estimation;
+mod factor;
+mod line_factor;
+mod line_form;
+mod line_sight;
+mod loss;
+mod minimise;
+mod normal_equations;
+mod observations;
+mod options;
+mod parametrisation;
+mod point_factor;
+mod point_sight;
+mod pose_factor;
+mod problem;
+mod reduced_system;
+mod summary;
+mod whitening;
+
+pub use adjustment::{Adjusted, adjust, adjust_watched};
+pub use error::Error;
+pub use factor::{Factor, MOST_RESIDUALS};
+pub use loss::Loss;
+pub use minimise::{Ending, Minimum, Optimiser, SolverOptions, Step, minimise, minimise_watched};
+pub use options::{LineKind, Method, Options, Parallelism, PointForm, PosePrior};
+pub use parametrisation::{
+    DirectionSpace, LineSpace, MOST_FREEDOM, Parametrisation, PoseSpace, RotationSpace, VectorSpace,
+};
+pub use problem::{Problem, Values, Variable};
+pub use summary::{Reason, ReleasedLine, Summary, Tally};

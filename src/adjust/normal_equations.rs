@@ -1,0 +1,595 @@
+//! Normal equations by blocks, and their solution by elimination.
+
+use super::elimination::{Elimination, Incidence, Pair, Place};
+use super::error::Error;
+use super::problem::Problem;
+use super::reduced_system::ReducedSystem;
+#[cfg(test)]
+use nalgebra::DMatrix;
+use nalgebra::{SMatrix, SVector, linalg::Cholesky};
+use rayon::prelude::*;
+
+/// Variables whose blocks are summed by one task.
+const CHUNK: usize = 16;
+
+/// Least and largest entry of the diagonal by which damping is scaled.
+const SCALES: [f64; 2] = [1e-6, 1e32];
+
+/// `H δ = −g` for a problem, with `H = JᵀJ` and `g = Jᵀr` of weighted residuals.
+pub(super) struct NormalEquations {
+    pub(super) structure: Elimination,
+    pub(super) system: ReducedSystem,
+    /// First number of each variable's step among all: reduced blocks first, then eliminated ones.
+    step_start: Vec<usize>,
+    residuals: Vec<f64>,
+    jacobians: Vec<f64>,
+    gradient: Vec<f64>,
+    diagonal: Vec<f64>,
+    /// Diagonal blocks, row by row: of reduced blocks, then of eliminated ones.
+    blocks: Vec<f64>,
+    block_start: Vec<usize>,
+    /// `W`: a row for each number of the eliminated variable, a column for each of the reduced one.
+    ties: Vec<f64>,
+    /// `H_ee⁻¹ W`, in the same places.
+    solved_ties: Vec<f64>,
+    /// `H_ee⁻¹ g_e`.
+    solved_gradient: Vec<f64>,
+    /// `H_ee⁻¹`, row by row, kept for covariances.
+    inverses: Vec<f64>,
+    column_starts: Vec<usize>,
+}
+
+impl NormalEquations {
+    /// Room for the normal equations of a problem.
+    pub(super) fn new(problem: &Problem) -> Result<Self, Error> {
+        let (structure, system) = Elimination::new(problem)?;
+        let sizes = || structure.reduced_sizes.iter().chain(&structure.eliminated_sizes).copied();
+        let (mut step_start, mut block_start) = (vec![0], vec![0]);
+        for size in sizes() {
+            step_start.push(step_start[step_start.len() - 1] + size);
+            block_start.push(block_start[block_start.len() - 1] + size * size);
+        }
+        let unknowns = step_start[step_start.len() - 1];
+        let reduced = system.rows();
+        let ties = structure.edge_start[structure.edge_start.len() - 1];
+        let blocks = block_start[block_start.len() - 1];
+        let inverses = blocks - block_start[structure.reduced.len()];
+        let column_starts = system.column_starts();
+        Ok(Self {
+            residuals: vec![0.0; problem.layout.residuals],
+            jacobians: vec![0.0; problem.layout.jacobians],
+            gradient: vec![0.0; unknowns],
+            diagonal: vec![0.0; unknowns],
+            blocks: vec![0.0; blocks],
+            block_start,
+            ties: vec![0.0; ties],
+            solved_ties: vec![0.0; ties],
+            solved_gradient: vec![0.0; unknowns - reduced],
+            inverses: vec![0.0; inverses],
+            step_start,
+            column_starts,
+            structure,
+            system,
+        })
+    }
+
+    /// Degrees of freedom of all variables that are not held.
+    pub(super) fn unknowns(&self) -> usize {
+        self.gradient.len()
+    }
+
+    /// Evaluates all factors at the problem's values; gives the cost.
+    pub(super) fn linearise(&mut self, problem: &Problem) -> f64 {
+        let cost = problem.evaluate(&problem.numbers, &mut self.residuals, Some(&mut self.jacobians));
+        if cost.is_finite() {
+            self.sum();
+        }
+        cost
+    }
+
+    /// Sums diagonal blocks, gradient and ties; every sum is made by one task, in the order of the factors.
+    fn sum(&mut self) {
+        let reduced = self.structure.reduced.len();
+        let variables = reduced + self.structure.eliminated.len();
+        let (structure, residuals, jacobians) = (&self.structure, &self.residuals, &self.jacobians);
+        let (step_start, block_start) = (&self.step_start, &self.block_start);
+        let bounds: Vec<usize> = (0..variables).step_by(CHUNK).chain([variables]).collect();
+        let gradients = split(&mut self.gradient, bounds.iter().map(|at| step_start[*at]));
+        let blocks = split(&mut self.blocks, bounds.iter().map(|at| block_start[*at]));
+        gradients.into_par_iter().zip(blocks).enumerate().for_each(|(chunk, (gradient, blocks))| {
+            let first = bounds[chunk];
+            gradient.fill(0.0);
+            blocks.fill(0.0);
+            for variable in first..bounds[chunk + 1] {
+                let incidences = if variable < reduced {
+                    structure.incidences_of_reduced.of(variable)
+                } else {
+                    structure.incidences_of_eliminated.of(variable - reduced)
+                };
+                let size = step_start[variable + 1] - step_start[variable];
+                let gradient = &mut gradient[step_start[variable] - step_start[first]..][..size];
+                let block = &mut blocks[block_start[variable] - block_start[first]..][..size * size];
+                match size {
+                    6 => sum_diagonal::<6>(incidences, residuals, jacobians, gradient, block),
+                    4 => sum_diagonal::<4>(incidences, residuals, jacobians, gradient, block),
+                    3 => sum_diagonal::<3>(incidences, residuals, jacobians, gradient, block),
+                    2 => sum_diagonal::<2>(incidences, residuals, jacobians, gradient, block),
+                    5 => sum_diagonal::<5>(incidences, residuals, jacobians, gradient, block),
+                    _ => sum_diagonal::<1>(incidences, residuals, jacobians, gradient, block),
+                }
+            }
+        });
+        let eliminated = structure.eliminated.len();
+        let bounds: Vec<usize> = (0..eliminated).step_by(CHUNK).chain([eliminated]).collect();
+        let first_number = |at: usize| structure.edge_start[structure.edges.start[at]];
+        let ties = split(&mut self.ties, bounds.iter().map(|at| first_number(*at)));
+        ties.into_par_iter().enumerate().for_each(|(chunk, ties)| {
+            ties.fill(0.0);
+            let begin = first_number(bounds[chunk]);
+            for at in bounds[chunk]..bounds[chunk + 1] {
+                for pair in structure.pairs_of_eliminated.of(at) {
+                    let edge = pair.other as usize;
+                    let block = structure.edges.items[edge] as usize;
+                    let (size, other) = (structure.eliminated_sizes[at], structure.reduced_sizes[block]);
+                    let tie = &mut ties[structure.edge_start[edge] - begin..][..size * other];
+                    match (size, other) {
+                        (3, 6) => add_product::<3, 6>(pair, jacobians, tie),
+                        (6, 3) => add_product::<6, 3>(pair, jacobians, tie),
+                        (4, 6) => add_product::<4, 6>(pair, jacobians, tie),
+                        (6, 4) => add_product::<6, 4>(pair, jacobians, tie),
+                        _ => add_any_product(pair, jacobians, size, other, tie),
+                    }
+                }
+            }
+        });
+        for variable in 0..variables {
+            let size = step_start[variable + 1] - step_start[variable];
+            for k in 0..size {
+                self.diagonal[step_start[variable] + k] =
+                    self.blocks[block_start[variable] + k * size + k].clamp(SCALES[0], SCALES[1]);
+            }
+        }
+    }
+
+    /// Largest entry of the gradient.
+    pub(super) fn gradient_max(&self) -> f64 {
+        self.gradient.iter().fold(0.0, |largest, entry| f64::max(largest, entry.abs()))
+    }
+
+    /// Factorises `H + damping · diag H`; `false` where that is not positive.
+    pub(super) fn factorise(&mut self, damping: f64) -> bool {
+        self.eliminate(damping) && {
+            self.reduce(damping);
+            self.system.factorise()
+        }
+    }
+
+    /// `H_ee⁻¹` for each eliminated variable, and its products.
+    fn eliminate(&mut self, damping: f64) -> bool {
+        let structure = &self.structure;
+        let reduced = structure.reduced.len();
+        let eliminated = structure.eliminated.len();
+        let bounds: Vec<usize> = (0..eliminated).step_by(CHUNK).chain([eliminated]).collect();
+        let (step_start, block_start) = (&self.step_start, &self.block_start);
+        let first_number = |at: usize| structure.edge_start[structure.edges.start[at]];
+        let (first_step, first_block) = (step_start[reduced], block_start[reduced]);
+        let solved_ties = split(&mut self.solved_ties, bounds.iter().map(|at| first_number(*at)));
+        let gradients =
+            split(&mut self.solved_gradient, bounds.iter().map(|at| step_start[reduced + at] - first_step));
+        let inverses =
+            split(&mut self.inverses, bounds.iter().map(|at| block_start[reduced + at] - first_block));
+        let (blocks, ties, gradient, diagonal) = (&self.blocks, &self.ties, &self.gradient, &self.diagonal);
+        solved_ties
+            .into_par_iter()
+            .zip(gradients)
+            .zip(inverses)
+            .enumerate()
+            .map(|(chunk, ((solved_ties, solved_gradient), inverses))| {
+                let first = bounds[chunk];
+                let begin = first_number(first);
+                for at in first..bounds[chunk + 1] {
+                    let variable = reduced + at;
+                    let size = structure.eliminated_sizes[at];
+                    let steps = step_start[variable]..step_start[variable + 1];
+                    let block = &blocks[block_start[variable]..block_start[variable + 1]];
+                    let inverse =
+                        &mut inverses[block_start[variable] - block_start[reduced + first]..][..size * size];
+                    let diagonal = &diagonal[steps.clone()];
+                    let positive = match size {
+                        6 => invert::<6>(block, diagonal, damping, inverse),
+                        4 => invert::<4>(block, diagonal, damping, inverse),
+                        3 => invert::<3>(block, diagonal, damping, inverse),
+                        2 => invert::<2>(block, diagonal, damping, inverse),
+                        5 => invert::<5>(block, diagonal, damping, inverse),
+                        _ => invert::<1>(block, diagonal, damping, inverse),
+                    };
+                    if !positive {
+                        return false;
+                    }
+                    let solved =
+                        &mut solved_gradient[step_start[variable] - step_start[reduced + first]..][..size];
+                    multiply(inverse, &gradient[steps], size, 1, solved);
+                    for edge in structure.edges.start[at]..structure.edges.start[at + 1] {
+                        let numbers = structure.edge_start[edge]..structure.edge_start[edge + 1];
+                        let columns = numbers.len() / size;
+                        let solved = &mut solved_ties[numbers.start - begin..numbers.end - begin];
+                        match (size, columns) {
+                            (3, 6) => multiply_fixed::<3, 6>(inverse, &ties[numbers], solved),
+                            (6, 3) => multiply_fixed::<6, 3>(inverse, &ties[numbers], solved),
+                            _ => multiply(inverse, &ties[numbers], size, columns, solved),
+                        }
+                    }
+                }
+                true
+            })
+            .reduce(|| true, |a, b| a && b)
+    }
+
+    /// `S = H_rr − Σ W H_ee⁻¹ Wᵀ`: every block column is one task.
+    fn reduce(&mut self, damping: f64) {
+        let (structure, jacobians) = (&self.structure, &self.jacobians);
+        let (blocks, block_start) = (&self.blocks, &self.block_start);
+        let (ties, solved_ties, diagonal) = (&self.ties, &self.solved_ties, &self.diagonal);
+        let mut values = std::mem::take(&mut self.system.values);
+        let system = &self.system;
+        let columns = split(&mut values, self.column_starts.iter().copied());
+        columns.into_par_iter().enumerate().for_each_init(Vec::new, |local, (column, values)| {
+            values.fill(0.0);
+            let places = system.places(column, local);
+            let size = structure.reduced_sizes[column];
+            let block = &blocks[block_start[column]..block_start[column + 1]];
+            for c in 0..size {
+                let at = places.at(column, c);
+                for r in c..size {
+                    values[at + r] = block[r * size + c];
+                }
+                values[at + c] += damping * diagonal[system.start[column] + c];
+            }
+            for pair in structure.pairs_of_reduced.of(column) {
+                let row = pair.other as usize;
+                let other = structure.reduced_sizes[row];
+                let Incidence { jacobian, rows, columns, column: mine, .. } = pair.incidence;
+                for c in 0..size {
+                    let target = &mut values[places.at(row, c)..][..other];
+                    for k in 0..rows as usize {
+                        let line = &jacobians[jacobian + k * columns as usize..];
+                        let factor = line[mine as usize + c];
+                        for (target, entry) in target.iter_mut().zip(&line[pair.other_column as usize..]) {
+                            *target += factor * entry;
+                        }
+                    }
+                }
+            }
+            for (at, edge) in structure.edges_of_reduced.of(column) {
+                let (at, edge) = (*at as usize, *edge as usize);
+                let inner = structure.eliminated_sizes[at];
+                let solved = &solved_ties[structure.edge_start[edge]..structure.edge_start[edge + 1]];
+                for other in edge..structure.edges.start[at + 1] {
+                    let row = structure.edges.items[other] as usize;
+                    let tie = &ties[structure.edge_start[other]..structure.edge_start[other + 1]];
+                    let rows = structure.reduced_sizes[row];
+                    match (inner, rows, size) {
+                        (3, 6, 6) => {
+                            subtract::<3, 6, 6>(tie, solved, values, row == column, |c| places.at(row, c))
+                        }
+                        (6, 3, 3) => {
+                            subtract::<6, 3, 3>(tie, solved, values, row == column, |c| places.at(row, c))
+                        }
+                        (4, 6, 6) => {
+                            subtract::<4, 6, 6>(tie, solved, values, row == column, |c| places.at(row, c))
+                        }
+                        _ => {
+                            let shape = [inner, rows, size];
+                            subtract_any(shape, tie, solved, values, row == column, |c| places.at(row, c));
+                        }
+                    }
+                }
+            }
+        });
+        self.system.values = values;
+    }
+
+    /// Solves for a step: `(H + damping diag H) δ = right`; needs [`NormalEquations::factorise`].
+    ///
+    /// * `right`, `step` — unknowns in the order of the step.
+    pub(super) fn solve(&self, right: &[f64], step: &mut [f64]) {
+        let structure = &self.structure;
+        let rows = self.system.rows();
+        let (reduced_step, eliminated_step) = step.split_at_mut(rows);
+        let (reduced_right, eliminated_right) = right.split_at(rows);
+        // right_e through the inverses, and from there to the reduced side.
+        let reduced = structure.reduced.len();
+        for at in 0..structure.eliminated.len() {
+            let size = structure.eliminated_sizes[at];
+            let begin = self.step_start[reduced + at] - rows;
+            let inverse = self.inverse(at);
+            multiply(
+                inverse,
+                &eliminated_right[begin..begin + size],
+                size,
+                1,
+                &mut eliminated_step[begin..begin + size],
+            );
+        }
+        reduced_step.copy_from_slice(reduced_right);
+        for column in 0..reduced {
+            let target = &mut reduced_step[self.system.start[column]..self.system.start[column + 1]];
+            for (at, edge) in structure.edges_of_reduced.of(column) {
+                let (at, edge) = (*at as usize, *edge as usize);
+                let begin = self.step_start[reduced + at] - rows;
+                let tie = &self.ties[structure.edge_start[edge]..structure.edge_start[edge + 1]];
+                let size = target.len();
+                for (k, solved) in
+                    eliminated_step[begin..begin + structure.eliminated_sizes[at]].iter().enumerate()
+                {
+                    for (target, entry) in target.iter_mut().zip(&tie[k * size..(k + 1) * size]) {
+                        *target -= entry * solved;
+                    }
+                }
+            }
+        }
+        self.system.solve(reduced_step);
+        for at in 0..structure.eliminated.len() {
+            let size = structure.eliminated_sizes[at];
+            let begin = self.step_start[reduced + at] - rows;
+            for edge in structure.edges.start[at]..structure.edges.start[at + 1] {
+                let column = structure.edges.items[edge] as usize;
+                let moved = &reduced_step[self.system.start[column]..self.system.start[column + 1]];
+                let solved = &self.solved_ties[structure.edge_start[edge]..structure.edge_start[edge + 1]];
+                for k in 0..size {
+                    let line = &solved[k * moved.len()..(k + 1) * moved.len()];
+                    let sum: f64 = line.iter().zip(moved).map(|(entry, moved)| entry * moved).sum();
+                    eliminated_step[begin + k] -= sum;
+                }
+            }
+        }
+    }
+
+    /// `H_ee⁻¹` of an eliminated variable, row by row, as [`NormalEquations::factorise`] left it.
+    pub(super) fn inverse(&self, at: usize) -> &[f64] {
+        let reduced = self.structure.reduced.len();
+        let first = self.block_start[reduced];
+        &self.inverses[self.block_start[reduced + at] - first..self.block_start[reduced + at + 1] - first]
+    }
+
+    /// `H_ee⁻¹ W` of an edge, row by row.
+    pub(super) fn solved_tie(&self, edge: usize) -> &[f64] {
+        &self.solved_ties[self.structure.edge_start[edge]..self.structure.edge_start[edge + 1]]
+    }
+
+    /// The gradient `Jᵀr`.
+    pub(super) fn gradient(&self) -> &[f64] {
+        &self.gradient
+    }
+
+    /// The diagonal of `H`, kept away from zero.
+    pub(super) fn diagonal(&self) -> &[f64] {
+        &self.diagonal
+    }
+
+    /// Where the step of a variable stands; `None` for one that is held.
+    pub(super) fn step_of(&self, variable: usize) -> Option<std::ops::Range<usize>> {
+        let place = match self.structure.places[variable] {
+            Place::Held => return None,
+            Place::Reduced(at) => at,
+            Place::Eliminated(at) => self.structure.reduced.len() + at,
+        };
+        Some(self.step_start[place]..self.step_start[place + 1])
+    }
+
+    /// `|J v|²` for a step `v`.
+    pub(super) fn squared_change(&self, problem: &Problem, step: &[f64]) -> f64 {
+        let mut sum = 0.0;
+        for layout in &problem.layout.batches {
+            let count = layout.variables.len() / layout.arity.max(1);
+            let parts: Vec<f64> = (0..count.div_ceil(256))
+                .into_par_iter()
+                .map(|chunk| {
+                    let mut sum = 0.0;
+                    for factor in chunk * 256..((chunk + 1) * 256).min(count) {
+                        let variables = &layout.variables[factor * layout.arity..(factor + 1) * layout.arity];
+                        for row in 0..layout.rows {
+                            let begin = layout.jacobian_start + (factor * layout.rows + row) * layout.columns;
+                            let mut column = begin;
+                            let mut change = 0.0;
+                            for variable in variables {
+                                let size = problem.freedom(*variable);
+                                if let Some(range) = self.step_of(variable.index()) {
+                                    let line = &self.jacobians[column..column + size];
+                                    change += line.iter().zip(&step[range]).map(|(j, s)| j * s).sum::<f64>();
+                                }
+                                column += size;
+                            }
+                            sum += change * change;
+                        }
+                    }
+                    sum
+                })
+                .collect();
+            sum += parts.iter().sum::<f64>();
+        }
+        sum
+    }
+}
+
+/// Cuts numbers at places, the first of which is 0 and the last their end.
+fn split(mut numbers: &mut [f64], bounds: impl IntoIterator<Item = usize>) -> Vec<&mut [f64]> {
+    let mut bounds = bounds.into_iter();
+    let mut before = bounds.next().unwrap_or(0);
+    let mut parts = Vec::new();
+    for bound in bounds {
+        let (part, rest) = numbers.split_at_mut(bound - before);
+        parts.push(part);
+        numbers = rest;
+        before = bound;
+    }
+    parts
+}
+
+/// `Σ JᵀJ` and `Σ Jᵀr` of one variable.
+fn sum_diagonal<const N: usize>(
+    incidences: &[Incidence],
+    residuals: &[f64],
+    jacobians: &[f64],
+    gradient: &mut [f64],
+    block: &mut [f64],
+) {
+    let (mut sum, mut side) = ([[0.0; N]; N], [0.0; N]);
+    for incidence in incidences {
+        let Incidence { jacobian, residual, rows, columns, column } = *incidence;
+        for k in 0..rows as usize {
+            let from = jacobian + k * columns as usize + column as usize;
+            let line: &[f64; N] = jacobians[from..].first_chunk().unwrap_or(&[0.0; N]);
+            let r = residuals[residual + k];
+            for a in 0..N {
+                side[a] += line[a] * r;
+                for b in 0..N {
+                    sum[a][b] += line[a] * line[b];
+                }
+            }
+        }
+    }
+    gradient.copy_from_slice(&side);
+    block.copy_from_slice(sum.as_flattened());
+}
+
+/// Adds `J_eᵀ J_r` of one factor.
+fn add_product<const E: usize, const R: usize>(pair: &Pair, jacobians: &[f64], tie: &mut [f64]) {
+    let Incidence { jacobian, rows, columns, column, .. } = pair.incidence;
+    for k in 0..rows as usize {
+        let line = &jacobians[jacobian + k * columns as usize..][..columns as usize];
+        let mine: &[f64; E] = line[column as usize..].first_chunk().unwrap_or(&[0.0; E]);
+        let other: &[f64; R] = line[pair.other_column as usize..].first_chunk().unwrap_or(&[0.0; R]);
+        for a in 0..E {
+            for b in 0..R {
+                tie[a * R + b] += mine[a] * other[b];
+            }
+        }
+    }
+}
+
+fn add_any_product(pair: &Pair, jacobians: &[f64], size: usize, other: usize, tie: &mut [f64]) {
+    let Incidence { jacobian, rows, columns, column, .. } = pair.incidence;
+    for k in 0..rows as usize {
+        let line = &jacobians[jacobian + k * columns as usize..][..columns as usize];
+        for a in 0..size {
+            let factor = line[column as usize + a];
+            let entries = &line[pair.other_column as usize..][..other];
+            for (target, entry) in tie[a * other..(a + 1) * other].iter_mut().zip(entries) {
+                *target += factor * entry;
+            }
+        }
+    }
+}
+
+/// The inverse of a damped block; `false` where it is not positive.
+fn invert<const N: usize>(block: &[f64], diagonal: &[f64], damping: f64, inverse: &mut [f64]) -> bool {
+    let mut matrix = SMatrix::<f64, N, N>::from_row_slice(block);
+    for k in 0..N {
+        matrix[(k, k)] += damping * diagonal[k];
+    }
+    let Some(factor) = Cholesky::new(matrix) else { return false };
+    for column in 0..N {
+        let mut solution = SVector::<f64, N>::zeros();
+        solution[column] = 1.0;
+        factor.solve_mut(&mut solution);
+        // Symmetric: a column is a row.
+        inverse[column * N..(column + 1) * N].copy_from_slice(solution.as_slice());
+    }
+    inverse.iter().all(|entry| entry.is_finite())
+}
+
+/// A square matrix times one with some columns, row by row.
+fn multiply(matrix: &[f64], right: &[f64], size: usize, columns: usize, product: &mut [f64]) {
+    for a in 0..size {
+        for b in 0..columns {
+            product[a * columns + b] = (0..size).map(|k| matrix[a * size + k] * right[k * columns + b]).sum();
+        }
+    }
+}
+
+fn multiply_fixed<const E: usize, const R: usize>(matrix: &[f64], right: &[f64], product: &mut [f64]) {
+    for a in 0..E {
+        let mut line = [0.0; R];
+        for k in 0..E {
+            let factor = matrix[a * E + k];
+            for b in 0..R {
+                line[b] += factor * right[k * R + b];
+            }
+        }
+        product[a * R..(a + 1) * R].copy_from_slice(&line);
+    }
+}
+
+/// Takes `Wᵀ Y` off the block of a row, `Y` of the column.
+#[inline]
+fn subtract<const E: usize, const R: usize, const C: usize>(
+    tie: &[f64],
+    solved: &[f64],
+    values: &mut [f64],
+    diagonal: bool,
+    place: impl Fn(usize) -> usize,
+) {
+    let mut product = [[0.0; R]; C];
+    for k in 0..E {
+        let line: &[f64; R] = tie[k * R..].first_chunk().unwrap_or(&[0.0; R]);
+        let mine: &[f64; C] = solved[k * C..].first_chunk().unwrap_or(&[0.0; C]);
+        for c in 0..C {
+            for r in 0..R {
+                product[c][r] += mine[c] * line[r];
+            }
+        }
+    }
+    for (c, product) in product.iter().enumerate() {
+        let from = if diagonal { c } else { 0 };
+        let begin = place(c);
+        for (target, entry) in values[begin + from..begin + R].iter_mut().zip(&product[from..]) {
+            *target -= entry;
+        }
+    }
+}
+
+fn subtract_any(
+    [inner, rows, columns]: [usize; 3],
+    tie: &[f64],
+    solved: &[f64],
+    values: &mut [f64],
+    diagonal: bool,
+    place: impl Fn(usize) -> usize,
+) {
+    for c in 0..columns {
+        let begin = place(c);
+        let from = if diagonal { c } else { 0 };
+        for k in 0..inner {
+            let factor = solved[k * columns + c];
+            for r in from..rows {
+                values[begin + r] -= factor * tie[k * rows + r];
+            }
+        }
+    }
+}
+
+/// A dense copy of `H`, for tests of what is done without one.
+#[cfg(test)]
+pub(super) fn dense_hessian(problem: &Problem, equations: &NormalEquations) -> DMatrix<f64> {
+    let unknowns = equations.unknowns();
+    let mut dense = DMatrix::zeros(problem.layout.residuals, unknowns);
+    for layout in &problem.layout.batches {
+        for (factor, variables) in layout.variables.chunks_exact(layout.arity).enumerate() {
+            for row in 0..layout.rows {
+                let mut column = layout.jacobian_start + (factor * layout.rows + row) * layout.columns;
+                for variable in variables {
+                    let size = problem.freedom(*variable);
+                    if let Some(range) = equations.step_of(variable.index()) {
+                        for (k, at) in range.enumerate() {
+                            dense[(layout.residual_start + factor * layout.rows + row, at)] =
+                                equations.jacobians[column + k];
+                        }
+                    }
+                    column += size;
+                }
+            }
+        }
+    }
+    dense.transpose() * dense
+}

@@ -1,0 +1,247 @@
+//! The reduced system and its Cholesky factor, dense or sparse.
+
+use super::block_pattern::BlockPattern;
+use super::error::Error;
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt;
+use faer::linalg::cholesky::llt::factor::LltRegularization;
+use faer::sparse::linalg::cholesky::{
+    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
+use faer::{Conj, MatMut, MatRef, Par, Side};
+
+/// Most unknowns of a dense system: 20000 squared are 3.2 GB.
+const MOST_DENSE: usize = 20_000;
+
+/// A symmetric positive matrix by its lower triangle in block columns, and its factor `L Lᵀ`.
+pub(super) struct ReducedSystem {
+    /// First row of each block, and the number of rows at the end.
+    pub(super) start: Vec<usize>,
+    pub(super) pattern: BlockPattern,
+    /// Columns of the lower triangle, as `storage` says; the dense factor takes their place.
+    pub(super) values: Vec<f64>,
+    storage: Storage,
+}
+
+enum Storage {
+    /// Whole columns.
+    Dense { memory: MemBuffer },
+    /// Only what is not zero.
+    Sparse(Box<Sparse>),
+}
+
+struct Sparse {
+    matrix: SymbolicSparseColMat<u32>,
+    symbolic: SymbolicCholesky<u32>,
+    factor: Vec<f64>,
+    memory: MemBuffer,
+}
+
+impl ReducedSystem {
+    /// Makes room for a matrix of this pattern.
+    ///
+    /// * `sizes` — rows of each block; `sparse` — multiplications of a sparse factorisation in this order.
+    pub(super) fn new(pattern: BlockPattern, sizes: &[usize], sparse: f64) -> Result<Self, Error> {
+        let mut start = vec![0];
+        for size in sizes {
+            start.push(start[start.len() - 1] + size);
+        }
+        let rows = start[sizes.len()];
+        if Self::is_dense(rows, sparse) {
+            if rows > MOST_DENSE {
+                return Err(Error::TooLarge { most: MOST_DENSE, found: rows });
+            }
+            let request =
+                llt::factor::cholesky_in_place_scratch::<f64>(rows, Par::Seq, faer::Spec::default());
+            let memory = MemBuffer::try_new(request).map_err(|_| too_large(rows))?;
+            return Ok(Self {
+                start,
+                pattern,
+                values: vec![0.0; rows * rows],
+                storage: Storage::Dense { memory },
+            });
+        }
+        let (mut starts, mut indices) = (vec![0_u32], Vec::new());
+        for block in 0..pattern.len() {
+            for column in start[block]..start[block + 1] {
+                indices.extend((column..start[block + 1]).filter_map(|row| u32::try_from(row).ok()));
+                for below in pattern.below(block) {
+                    let below = *below as usize;
+                    indices
+                        .extend((start[below]..start[below + 1]).filter_map(|row| u32::try_from(row).ok()));
+                }
+                starts.push(u32::try_from(indices.len()).map_err(|_| too_large(rows))?);
+            }
+        }
+        let values = vec![0.0; indices.len()];
+        let (upper_starts, upper_indices) = transposed(rows, &starts, &indices);
+        let upper = SymbolicSparseColMat::new_checked(rows, rows, upper_starts, None, upper_indices);
+        let matrix = SymbolicSparseColMat::new_checked(rows, rows, starts, None, indices);
+        // The analysis looks at the upper triangle alone.
+        let symbolic = factorize_symbolic_cholesky(
+            upper.as_ref(),
+            Side::Upper,
+            SymmetricOrdering::Identity,
+            CholeskySymbolicParams::default(),
+        )
+        .map_err(|_| too_large(rows))?;
+        let request = symbolic
+            .factorize_numeric_llt_scratch::<f64>(Par::Seq, faer::Spec::default())
+            .or(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
+        let memory = MemBuffer::try_new(request).map_err(|_| too_large(rows))?;
+        let factor = vec![0.0; symbolic.len_val()];
+        let storage = Storage::Sparse(Box::new(Sparse { matrix, symbolic, factor, memory }));
+        Ok(Self { start, pattern, values, storage })
+    }
+
+    /// Whether a dense factorisation is the faster one: its multiplications run about three times as fast.
+    pub(super) fn is_dense(rows: usize, sparse: f64) -> bool {
+        rows <= 200 || (rows as f64).powi(3) / 6.0 < 2.5 * sparse
+    }
+
+    /// Rows of the matrix.
+    pub(super) fn rows(&self) -> usize {
+        self.start[self.start.len() - 1]
+    }
+
+    /// Where the values of each block column begin, and their number at the end.
+    pub(super) fn column_starts(&self) -> Vec<usize> {
+        let rows = self.rows();
+        match &self.storage {
+            Storage::Dense { .. } => self.start.iter().map(|first| first * rows).collect(),
+            Storage::Sparse(sparse) => {
+                self.start.iter().map(|first| sparse.matrix.col_ptr()[*first] as usize).collect()
+            }
+        }
+    }
+
+    /// Where the rows of a block column stand: see [`Places`].
+    pub(super) fn places<'a>(&self, column: usize, local: &'a mut Vec<usize>) -> Places<'a> {
+        local.resize(self.pattern.len(), 0);
+        match &self.storage {
+            Storage::Dense { .. } => {
+                for row in self.pattern.below(column) {
+                    local[*row as usize] = self.start[*row as usize];
+                }
+                local[column] = self.start[column];
+                Places { local, stride: self.rows(), packed: false }
+            }
+            Storage::Sparse(_) => {
+                let size = self.start[column + 1] - self.start[column];
+                let mut next = size;
+                local[column] = 0;
+                for row in self.pattern.below(column) {
+                    let row = *row as usize;
+                    local[row] = next;
+                    next += self.start[row + 1] - self.start[row];
+                }
+                Places { local, stride: next, packed: true }
+            }
+        }
+    }
+
+    /// Factorises the values; `false` where the matrix is not positive.
+    pub(super) fn factorise(&mut self) -> bool {
+        let rows = self.rows();
+        if rows == 0 {
+            return true;
+        }
+        match &mut self.storage {
+            Storage::Dense { memory } => {
+                let matrix = MatMut::from_column_major_slice_mut(&mut self.values, rows, rows);
+                let stack = MemStack::new(memory);
+                let regularisation = LltRegularization::default();
+                llt::factor::cholesky_in_place(matrix, regularisation, Par::Seq, stack, faer::Spec::default())
+                    .is_ok()
+            }
+            Storage::Sparse(sparse) => {
+                let Sparse { matrix, symbolic, factor, memory } = &mut **sparse;
+                let matrix = SparseColMatRef::new(matrix.as_ref(), &self.values[..]);
+                let stack = MemStack::new(memory);
+                let regularisation = LltRegularization::default();
+                // The simplicial factorisation adds to what is there.
+                factor.fill(0.0);
+                symbolic
+                    .factorize_numeric_llt(
+                        factor,
+                        matrix,
+                        Side::Lower,
+                        regularisation,
+                        Par::Seq,
+                        stack,
+                        faer::Spec::default(),
+                    )
+                    .is_ok()
+            }
+        }
+    }
+
+    /// Solves with the factor for one or several right sides, column by column.
+    pub(super) fn solve(&self, sides: &mut [f64]) {
+        let rows = self.rows();
+        if rows == 0 || sides.is_empty() {
+            return;
+        }
+        let columns = sides.len() / rows;
+        let sides = MatMut::from_column_major_slice_mut(sides, rows, columns);
+        match &self.storage {
+            Storage::Dense { .. } => {
+                let factor = MatRef::from_column_major_slice(&self.values, rows, rows);
+                let request = llt::solve::solve_in_place_scratch::<f64>(rows, columns, Par::Seq);
+                let mut memory = MemBuffer::new(request);
+                llt::solve::solve_in_place(factor, sides, Par::Seq, MemStack::new(&mut memory));
+            }
+            Storage::Sparse(sparse) => {
+                let request = sparse.symbolic.solve_in_place_scratch::<f64>(columns, Par::Seq);
+                let mut memory = MemBuffer::new(request);
+                let factor = LltRef::new(&sparse.symbolic, &sparse.factor);
+                factor.solve_in_place_with_conj(Conj::No, sides, Par::Seq, MemStack::new(&mut memory));
+            }
+        }
+    }
+}
+
+/// Starts and row indices of the transposed pattern, ascending.
+fn transposed(rows: usize, starts: &[u32], indices: &[u32]) -> (Vec<u32>, Vec<u32>) {
+    let mut upper = vec![0_u32; rows + 1];
+    indices.iter().for_each(|row| upper[*row as usize + 1] += 1);
+    for row in 0..rows {
+        upper[row + 1] += upper[row];
+    }
+    let (mut next, mut found) = (upper.clone(), vec![0_u32; indices.len()]);
+    for (column, window) in (0_u32..).zip(starts.windows(2)) {
+        for row in &indices[window[0] as usize..window[1] as usize] {
+            let at = &mut next[*row as usize];
+            found[*at as usize] = column;
+            *at += 1;
+        }
+    }
+    (upper, found)
+}
+
+fn too_large(found: usize) -> Error {
+    Error::TooLarge { most: MOST_DENSE, found }
+}
+
+/// Where numbers of one block column stand among its values.
+pub(super) struct Places<'a> {
+    local: &'a [usize],
+    stride: usize,
+    packed: bool,
+}
+
+impl Places<'_> {
+    /// The place of the first number of a block row in a column of the block.
+    ///
+    /// Of the diagonal block only the lower triangle has a place.
+    #[inline]
+    pub(super) fn at(&self, row: usize, column: usize) -> usize {
+        if self.packed {
+            // Column c leaves out the c numbers above the diagonal, and so did the ones before it.
+            self.local[row] + column * self.stride - column * (column + 1) / 2
+        } else {
+            self.local[row] + column * self.stride
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! Roots of information: what turns a residual into units of sigma.
+
+use super::line_sight::{EndsDepthSight, EndsSight, depth_in_plane};
+use super::observations::{LineView, PointView};
+use super::point_sight::{DepthSight, DepthWeight, PixelSight};
+use crate::geometry::{PinholeCamera, PluckerLine, Pose};
+use crate::structure::MeasurementNoise;
+use nalgebra::{DMatrix, Matrix2, Matrix2x4, Matrix3, Matrix4, Vector2};
+
+/// What a frame measured of a point, without its depth.
+pub(super) fn pixel_sight(view: &PointView, noise: &MeasurementNoise) -> PixelSight {
+    let root = match &view.information {
+        Some(information) => {
+            let part: Matrix2<f64> = information.fixed_view::<2, 2>(0, 0).into_owned();
+            part.cholesky().map_or_else(Matrix2::zeros, |factor| factor.l().transpose())
+        }
+        None => Matrix2::from_diagonal_element(1.0 / noise.sigma_px),
+    };
+    PixelSight { camera: view.camera, pixel: view.pixel, root }
+}
+
+/// What a frame measured of a point, with its depth.
+pub(super) fn depth_sight(view: &PointView, depth_m: f64, noise: &MeasurementNoise) -> DepthSight {
+    let weight = match &view.information {
+        Some(information) => {
+            let all: Matrix3<f64> = information.fixed_view::<3, 3>(0, 0).into_owned();
+            let root = all.cholesky().map_or_else(Matrix3::zeros, |factor| factor.l().transpose());
+            DepthWeight::Root(root)
+        }
+        None => DepthWeight::Noise(*noise),
+    };
+    DepthSight { camera: view.camera, pixel: view.pixel, depth_m, weight }
+}
+
+/// Covariance of the four coordinates of a segment's ends, px².
+fn coordinates(view: &LineView, noise: &MeasurementNoise) -> Matrix4<f64> {
+    let declared = Matrix4::from_diagonal_element(noise.sigma_px * noise.sigma_px);
+    let Some(information) = &view.information else { return declared };
+    let Some(covariance) = information.clone().cholesky().map(|factor| factor.inverse()) else {
+        return declared;
+    };
+    // Of six numbers the coordinates are all but the depths.
+    let places = if covariance.nrows() == 6 { [0, 1, 3, 4] } else { [0, 1, 2, 3] };
+    Matrix4::from_fn(|row, column| covariance[(places[row], places[column])])
+}
+
+/// What a frame measured of a line, without depths.
+pub(super) fn ends_sight(view: &LineView, noise: &MeasurementNoise) -> EndsSight {
+    let root = match &view.information {
+        None => Matrix2::from_diagonal_element(1.0 / noise.sigma_px),
+        Some(_) => {
+            let along = (view.ends[1] - view.ends[0]).normalize();
+            let (x, y) = (-along.y, along.x);
+            let across = Matrix2x4::new(x, y, 0.0, 0.0, 0.0, 0.0, x, y);
+            let covariance = across * coordinates(view, noise) * across.transpose();
+            let information = covariance.try_inverse().and_then(nalgebra::linalg::Cholesky::new);
+            information.map_or_else(Matrix2::zeros, |factor| factor.l().transpose())
+        }
+    };
+    EndsSight { camera: view.camera, ends: view.ends, root }
+}
+
+/// What a frame measured of a line, with depths; weighed for where the line is now.
+///
+/// The weights hold while the line stays about where it is: they depend on its slope in the image, and are not derived.
+pub(super) fn ends_depth_sight(
+    view: &LineView,
+    noise: &MeasurementNoise,
+    camera_from_world: &Pose,
+    line: &PluckerLine,
+) -> EndsDepthSight {
+    let ends = ends_sight(view, noise);
+    let along = (view.ends[1] - view.ends[0]).normalize();
+    let planes = view.ends.map(|end| EndsDepthSight::plane(&view.camera, end, along));
+    let (mut depths_m, mut weights) = ([0.0; 2], [0.0; 2]);
+    let coordinates = coordinates(view, noise);
+    let seen = line.transformed(camera_from_world);
+    for end in 0..2 {
+        let Some((depth, declared)) = view.depths[end].and_then(|depth| noise.depth(depth)) else { continue };
+        let sigma = view.information.as_ref().map_or(declared, |information| depth_sigma(information, end));
+        let slope = slope(&view.camera, view.ends[end], along, &seen);
+        let spread: Matrix2<f64> = coordinates.fixed_view::<2, 2>(2 * end, 2 * end).into_owned();
+        let shift = along.dot(&(spread * along));
+        let variance = sigma * sigma + slope * slope * shift;
+        let z = depth_in_plane(&planes[end], &seen.moment, &seen.direction);
+        // A line along the ray has no depth there, and one behind the camera was not seen.
+        if variance.is_finite() && variance > 0.0 && z > 0.0 && z.is_finite() {
+            depths_m[end] = depth;
+            weights[end] = 1.0 / variance.sqrt();
+        }
+    }
+    EndsDepthSight { ends, planes, depths_m, weights }
+}
+
+/// How fast a line's depth changes along its image, metres per pixel.
+fn slope(camera: &PinholeCamera, end: Vector2<f64>, along: Vector2<f64>, seen: &PluckerLine) -> f64 {
+    let at = |shift: f64| {
+        let plane = EndsDepthSight::plane(camera, end + along * shift, along);
+        depth_in_plane(&plane, &seen.moment, &seen.direction)
+    };
+    at(0.5) - at(-0.5)
+}
+
+/// Standard deviation of an end's depth by an information matrix over six numbers, metres.
+fn depth_sigma(information: &DMatrix<f64>, end: usize) -> f64 {
+    let place = if end == 0 { 2 } else { 5 };
+    let covariance = information.clone().cholesky().map(|factor| factor.inverse());
+    covariance
+        .filter(|covariance| covariance.nrows() == 6)
+        .map_or(f64::INFINITY, |covariance| covariance[(place, place)].max(0.0).sqrt())
+}

@@ -1,0 +1,50 @@
+//! What a method is given: noise where the source has none, depth where it has none.
+
+use crate::simulate::noise::NoiseRecipe;
+use crate::structure::{FrameBundle, Sequence, registry};
+
+/// A sequence with the measurements of a seed.
+///
+/// Points and lines each: where the sequence has noise-free observations, measurements are drawn from them; where it has noisy
+/// measurements alone, those stay as published. Measurements without depth then get one, drawn about the true depth. So a seed
+/// changes everything of a noise-free source, and the depths of a noisy one.
+#[must_use]
+pub fn measured(sequence: &Sequence, noise: &NoiseRecipe, seed: u64) -> Sequence {
+    let unrefined = sequence.map_lines.iter().filter(|row| row.estimate == registry::UNREFINED);
+    let mut made = Sequence {
+        manifest: sequence.manifest.clone(),
+        frames: sequence.frames.clone(),
+        point_landmarks: sequence.point_landmarks.clone(),
+        line_landmarks: sequence.line_landmarks.clone(),
+        structural_groups: sequence.structural_groups.clone(),
+        // The lines as they were observed: what the bound is computed at.
+        map_lines: unrefined.cloned().collect(),
+        ..Sequence::default()
+    };
+    let (points, lines) = (!sequence.point_observations.is_empty(), !sequence.line_observations.is_empty());
+    if !points {
+        made.point_measurements.clone_from(&sequence.point_measurements);
+    }
+    if !lines {
+        made.line_measurements.clone_from(&sequence.line_measurements);
+    }
+    let observed = Sequence {
+        frames: sequence.frames.clone(),
+        point_observations: sequence.point_observations.clone(),
+        line_observations: sequence.line_observations.clone(),
+        ..Sequence::default()
+    };
+    for FrameBundle { frame, point_observations, line_observations, .. } in observed.bundles() {
+        let Some(camera) = sequence.manifest.camera(frame.camera_id) else { continue };
+        let (of_points, of_lines) =
+            noise.measure(camera, frame.frame_id, &point_observations, &line_observations, seed);
+        made.point_measurements.extend(of_points);
+        made.line_measurements.extend(of_lines);
+    }
+    noise.complete_depths(&mut made, seed);
+    if points || lines || made.manifest.noise.is_none() {
+        made.manifest.noise = Some(noise.declared(seed));
+    }
+    made.sort();
+    made
+}

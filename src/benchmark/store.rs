@@ -1,0 +1,168 @@
+//! Cells on disk: one file each, so that a run that was cut off goes on where it ended.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use super::{Bound, Cell, CellKey, Error, Plan};
+use crate::unfinished::Unfinished;
+
+/// The file that says what the folder holds.
+const PLAN_FILE: &str = "plan.json";
+const CELLS: &str = "cells";
+const BOUNDS: &str = "bounds";
+
+/// What a stored plan was made by.
+#[derive(Clone, Debug, PartialEq, Serialize, serde::Deserialize)]
+struct StoredPlan {
+    /// Version of the program.
+    version: String,
+    #[serde(flatten)]
+    plan: Plan,
+}
+
+/// A folder of results.
+#[derive(Debug)]
+pub struct Store {
+    folder: PathBuf,
+}
+
+impl Store {
+    /// Opens a folder of results, or begins one.
+    ///
+    /// More methods, estimates or seeds may be asked for than before; noise and the program's version have to be the same.
+    ///
+    /// * `anew` — whether results that are there are removed first.
+    ///
+    /// # Errors
+    /// [`Error::OtherPlan`] when the folder holds results of another noise or version, [`Error::Stored`] when it holds
+    /// something else, [`Error::Io`].
+    pub fn open(folder: &Path, plan: &Plan, anew: bool) -> Result<Self, Error> {
+        let store = Self { folder: folder.to_owned() };
+        let file = folder.join(PLAN_FILE);
+        let version = env!("CARGO_PKG_VERSION").to_owned();
+        let begun = file.exists();
+        let other =
+            folder.exists() && !begun && fs::read_dir(folder).map_err(Error::io(folder))?.next().is_some();
+        if other {
+            // Never taken for ours, whatever is asked for.
+            return Err(Error::Stored {
+                path: folder.to_owned(),
+                detail: format!(
+                    "expected a folder of results with {PLAN_FILE}, or none; found something else"
+                ),
+            });
+        }
+        if begun && anew {
+            for part in [CELLS, BOUNDS] {
+                let path = folder.join(part);
+                if path.is_dir() {
+                    fs::remove_dir_all(&path).map_err(Error::io(&path))?;
+                }
+            }
+        } else if begun {
+            let stored: StoredPlan = read(&file)?;
+            let difference = if stored.version != version {
+                Some(format!("of version {}, this is {version}", stored.version))
+            } else if stored.plan.noise != plan.noise {
+                Some("of other noise".to_owned())
+            } else {
+                None
+            };
+            if let Some(difference) = difference {
+                return Err(Error::OtherPlan { path: folder.to_owned(), difference });
+            }
+        }
+        write(&file, &StoredPlan { version, plan: plan.clone() })?;
+        Ok(store)
+    }
+
+    /// The folder.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    fn cell_file(&self, key: &CellKey) -> PathBuf {
+        let folder = self.folder.join(CELLS).join(file_name(&key.sequence));
+        folder.join(format!("{}.{}.json", file_name(&key.method), key.seed))
+    }
+
+    fn bound_file(&self, sequence: &str) -> PathBuf {
+        self.folder.join(BOUNDS).join(format!("{}.json", file_name(sequence)))
+    }
+
+    /// The cell of a key, where it is done.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Stored`] for a file that is no cell, or another one.
+    pub fn cell(&self, key: &CellKey) -> Result<Option<Cell>, Error> {
+        let path = self.cell_file(key);
+        if !path.exists() {
+            return Ok(None);
+        }
+        let cell: Cell = read(&path)?;
+        if cell.key != *key {
+            let detail = format!("expected the cell of {key:?}, found that of {:?}", cell.key);
+            return Err(Error::Stored { path, detail });
+        }
+        Ok(Some(cell))
+    }
+
+    /// Keeps a cell.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn keep(&self, cell: &Cell) -> Result<(), Error> {
+        write(&self.cell_file(&cell.key), cell)
+    }
+
+    /// The bound of a sequence, where it is done.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Stored`].
+    pub fn bound(&self, sequence: &str) -> Result<Option<BTreeMap<String, Bound>>, Error> {
+        let path = self.bound_file(sequence);
+        if path.exists() { read(&path).map(Some) } else { Ok(None) }
+    }
+
+    /// Keeps the bounds of a sequence.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn keep_bound(&self, sequence: &str, bounds: &BTreeMap<String, Bound>) -> Result<(), Error> {
+        write(&self.bound_file(sequence), bounds)
+    }
+}
+
+/// A name that is safe as a part of a path; what had to be replaced is followed by a digest, so that names stay apart.
+fn file_name(name: &str) -> String {
+    let is_safe = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_');
+    if !name.is_empty() && name.len() <= 100 && name.chars().all(is_safe) {
+        return name.to_owned();
+    }
+    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+    for byte in name.bytes() {
+        hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+    }
+    let safe: String = name.chars().take(50).map(|c| if is_safe(c) { c } else { '_' }).collect();
+    format!("{safe}.{hash:016x}")
+}
+
+fn read<T: DeserializeOwned>(path: &Path) -> Result<T, Error> {
+    let text = fs::read_to_string(path).map_err(Error::io(path))?;
+    serde_json::from_str(&text)
+        .map_err(|cause| Error::Stored { path: path.to_owned(), detail: cause.to_string() })
+}
+
+fn write<T: Serialize>(path: &Path, value: &T) -> Result<(), Error> {
+    let mut text = serde_json::to_string_pretty(value)
+        .map_err(|cause| Error::Stored { path: path.to_owned(), detail: cause.to_string() })?;
+    text.push('\n');
+    let unfinished = Unfinished::beside(path).map_err(Error::io(path))?;
+    fs::write(unfinished.path(), text).map_err(Error::io(unfinished.path()))?;
+    unfinished.finish().map_err(Error::io(path))
+}

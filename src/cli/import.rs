@@ -1,0 +1,173 @@
+//! `os import`: a graph or a model of another program as a sequence.
+
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read, Write};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+use clap::ValueEnum;
+
+use super::export::refuse_input;
+use super::{Outcome, text};
+use crate::exchange::{
+    ImportNames, Imported, from_bal, from_colmap, from_g2o, read_bal, read_colmap, read_g2o,
+};
+use crate::format::{self, WriteOptions};
+
+/// Bytes of a file that are looked at to find its format.
+const GLANCE_BYTES: u64 = 4096;
+
+/// Import a graph or a model of another program as a sequence: its frames, cameras, measurements and a graph.
+///
+/// Ids and digits stay; what the sequence cannot say is told on stderr, and the exit code is 3 where something is
+/// lost. There is no truth in what is imported: its values are the initial values of the graph.
+#[derive(clap::Args, Debug)]
+#[command(after_help = "Formats:
+  g2o     pose graphs (SE2, SE3:QUAT) and bundle adjustment, FILE.g2o
+  bal     Bundle Adjustment in the Large, FILE.txt, uncompressed
+  colmap  COLMAP's text model: a folder with cameras.txt, images.txt, points3D.txt
+
+Examples:
+  os import sphere2500.g2o -o sphere2500
+  os import problem-49-7776-pre.txt --from bal -o ladybug.mcap
+  os import sparse/0 --from colmap -o south-building")]
+pub(super) struct Args {
+    /// File or folder.
+    input: PathBuf,
+    /// Format; found out by the name and the first line where it is not given.
+    #[arg(long, value_enum, value_name = "FORMAT")]
+    from: Option<Format>,
+    /// Output: NAME.mcap for an MCAP file, any other name for a Parquet folder.
+    #[arg(short, long, value_name = "PATH")]
+    output: PathBuf,
+    /// Name of the sequence; by default that of the input.
+    #[arg(long)]
+    name: Option<String>,
+    /// Name of the graph.
+    #[arg(long, value_name = "NAME", default_value = "initial")]
+    graph: String,
+    /// Replace the output if it exists.
+    #[arg(long)]
+    force: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Format {
+    G2o,
+    Bal,
+    Colmap,
+}
+
+pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome> {
+    refuse_input(&args.input, &args.output)?;
+    if !args.force && args.output.symlink_metadata().is_ok() {
+        return Err(format::Error::Exists { path: args.output.clone() }.into());
+    }
+    let from = match args.from {
+        Some(from) => from,
+        None => guess(&args.input)?,
+    };
+    let names = ImportNames { sequence: name(args)?, graph: args.graph.clone() };
+    let Imported { sequence, remarks } =
+        read(&args.input, from, &names).with_context(|| args.input.display().to_string())?;
+    let options = WriteOptions { force: args.force, ..WriteOptions::default() };
+    format::write(&args.output, &sequence, options)?;
+    let mut outcome = Outcome::Done;
+    for remark in &remarks {
+        let word = if remark.loss { "warning" } else { "note" };
+        writeln!(io::stderr(), "{word}: {remark}")?;
+        if remark.loss {
+            outcome = Outcome::Findings;
+        }
+    }
+    let count = |number: usize| text::count(number as u64);
+    writeln!(
+        stdout,
+        "{}: {} frames, {} points, {} factors in graph `{}`; {}",
+        args.output.display(),
+        count(sequence.frames.len()),
+        count(sequence.graph_points.len()),
+        count(sequence.graph_factors.len()),
+        args.graph,
+        text::bytes(text::size_on_disk(&args.output))
+    )?;
+    Ok(outcome)
+}
+
+fn read(input: &Path, from: Format, names: &ImportNames) -> anyhow::Result<Imported> {
+    let open = |path: &Path| File::open(path).map(BufReader::new).with_context(|| path.display().to_string());
+    Ok(match from {
+        Format::G2o => from_g2o(&read_g2o(open(input)?)?, names)?,
+        Format::Bal => from_bal(&read_bal(open(input)?)?, names)?,
+        Format::Colmap => {
+            let file = |name: &str| open(&input.join(name));
+            let model = read_colmap(file("cameras.txt")?, file("images.txt")?, file("points3D.txt")?)?;
+            from_colmap(&model, names)?
+        }
+    })
+}
+
+/// The name of the sequence: as given, or that of the input without what follows the last dot.
+fn name(args: &Args) -> anyhow::Result<String> {
+    let name = match &args.name {
+        Some(name) => name.clone(),
+        None => {
+            let path = args.input.canonicalize()?;
+            let name = if path.is_dir() { path.file_name() } else { path.file_stem() };
+            name.unwrap_or_default().to_string_lossy().into_owned()
+        }
+    };
+    if name.is_empty() || name.chars().any(|letter| "/\\".contains(letter) || letter.is_control()) {
+        bail!("--name: expected a name without `/`, `\\` and control characters, found {name:?}");
+    }
+    if args.graph.is_empty() {
+        bail!("--graph: expected a name, found none");
+    }
+    Ok(name)
+}
+
+/// The format of an input, by its name and its first words.
+fn guess(input: &Path) -> anyhow::Result<Format> {
+    if input.is_dir() {
+        let files = ["cameras.txt", "images.txt", "points3D.txt"];
+        if files.iter().all(|name| input.join(name).is_file()) {
+            return Ok(Format::Colmap);
+        }
+        let hint = if input.join("cameras.bin").is_file() {
+            "; `colmap model_converter --output_type TXT` makes them of a binary model"
+        } else {
+            ""
+        };
+        bail!("{}: expected a folder with {}{hint}", input.display(), files.join(", "));
+    }
+    if input.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("g2o")) {
+        return Ok(Format::G2o);
+    }
+    let file = File::open(input).with_context(|| input.display().to_string())?;
+    let mut reader = BufReader::new(file).take(GLANCE_BYTES);
+    let mut bytes = Vec::new();
+    loop {
+        bytes.clear();
+        if reader.read_until(b'\n', &mut bytes)? == 0 {
+            break;
+        }
+        let line = String::from_utf8_lossy(&bytes);
+        let line = line.trim();
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let words: Vec<&str> = line.split_ascii_whitespace().collect();
+        let is_count = |word: &&str| word.bytes().all(|byte| byte.is_ascii_digit());
+        if words.len() == 3 && words.iter().all(is_count) {
+            return Ok(Format::Bal);
+        }
+        if ["VERTEX_", "EDGE_", "PARAMS_", "FIX"].iter().any(|tag| line.starts_with(tag)) {
+            return Ok(Format::G2o);
+        }
+        break;
+    }
+    bail!(
+        "{}: expected a graph of g2o, a problem of BAL or a model of COLMAP; say which with --from",
+        input.display()
+    )
+}

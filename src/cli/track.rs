@@ -12,7 +12,7 @@ use super::progress::Progress;
 use super::{Outcome, extended, text};
 use crate::geometry::Pose;
 use crate::structure::{
-    DepthNoise, Estimate, MeasuredFrame, MeasurementNoise, Sequence, TrackedFrame, registry,
+    DepthNoise, Estimate, Frame, MeasuredFrame, MeasurementNoise, Sequence, TrackedFrame, registry,
 };
 use crate::track::{self, Method, Sensor, TrackOptions};
 

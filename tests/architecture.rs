@@ -307,7 +307,9 @@ const PLATFORM_MATHS: &[&str] = &[
 #[test]
 fn what_is_written_is_computed_the_same_on_every_machine() {
     let mut wrong = Vec::new();
-    for folder in ["src/geometry", "src/structure", "src/simulate", "src/statistics", "src/evaluate"] {
+    for folder in
+        ["src/geometry", "src/structure", "src/simulate", "src/statistics", "src/track", "src/evaluate"]
+    {
         for (path, text) in files(folder) {
             if path.contains("/tests") || path.ends_with("strategies.rs") {
                 continue;

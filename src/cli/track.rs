@@ -11,7 +11,9 @@ use serde_json::json;
 use super::progress::Progress;
 use super::{Outcome, extended, text};
 use crate::geometry::Pose;
-use crate::structure::{DepthNoise, Estimate, MeasuredFrame, MeasurementNoise, Sequence, TrackedFrame, registry};
+use crate::structure::{
+    DepthNoise, Estimate, Frame, MeasuredFrame, MeasurementNoise, Sequence, TrackedFrame, registry,
+};
 use crate::track::{self, Method, Sensor, TrackOptions};
 
 /// What a frame is aligned to.
@@ -42,6 +44,7 @@ enum SensorName {
 ///
 /// The output is the input with the estimate added: trajectories, map and what happened in each frame (table `tracking`).
 #[derive(clap::Args, Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command")]
 #[command(after_help = "Examples:
   os track box1 -o tracked --name ours
   os track box1.mcap -o tracked.mcap --method frame-to-frame --replace
@@ -140,7 +143,8 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     let mut tracker = args.options(sensor)?.tracker(&sequence.manifest.cameras, noise, first)?;
     let progress = Progress::new("tracking", "frames");
     let begun = Instant::now();
-    let estimate = track::track(&frames, &name, tracker.as_mut(), &|done, total| progress.update(done, total))?;
+    let estimate =
+        track::track(&frames, &name, tracker.as_mut(), &|done, total| progress.update(done, total))?;
     let seconds = begun.elapsed().as_secs_f64();
     drop(progress);
     let count = |state: &str| estimate.tracking.iter().filter(|row| row.state == state).count();
@@ -195,7 +199,7 @@ fn has_depth(sequence: &Sequence) -> bool {
 fn true_first_pose(sequence: &Sequence, frames: &[MeasuredFrame]) -> anyhow::Result<Pose> {
     let Some(first) = frames.first() else { return Ok(Pose::identity()) };
     let truth = sequence.frames.iter().find(|frame| frame.frame_id == first.frame_id);
-    match truth.and_then(|frame| frame.world_from_camera()) {
+    match truth.and_then(Frame::world_from_camera) {
         Some(row) => row.pose().with_context(|| format!("frames: the true pose of {}", first.frame_id)),
         None => Ok(Pose::identity()),
     }

@@ -74,7 +74,10 @@ fn few(camera: &PinholeCamera, points: &[(Point3<f64>, Point2<f64>)]) -> Vec<Pos
         for b in 1..c {
             for a in 0..b {
                 let triple = [a, b, c].map(|index| points[index]);
-                poses.extend(p3p(&triple.map(|(point, _)| point), &triple.map(|(_, pixel)| camera.ray(pixel))));
+                poses.extend(p3p(
+                    &triple.map(|(point, _)| point),
+                    &triple.map(|(_, pixel)| camera.ray(pixel)),
+                ));
             }
         }
     }

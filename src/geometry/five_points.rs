@@ -8,8 +8,26 @@ const STEPS: usize = 4;
 
 /// Exponents of x, y, z in the order in which equations are eliminated: the ten of degree three, then the basis.
 const MONOMIALS: [[usize; 3]; 20] = [
-    [3, 0, 0], [2, 1, 0], [1, 2, 0], [0, 3, 0], [2, 0, 1], [1, 1, 1], [0, 2, 1], [1, 0, 2], [0, 1, 2], [0, 0, 3],
-    [2, 0, 0], [1, 1, 0], [0, 2, 0], [1, 0, 1], [0, 1, 1], [0, 0, 2], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0],
+    [3, 0, 0],
+    [2, 1, 0],
+    [1, 2, 0],
+    [0, 3, 0],
+    [2, 0, 1],
+    [1, 1, 1],
+    [0, 2, 1],
+    [1, 0, 2],
+    [0, 1, 2],
+    [0, 0, 3],
+    [2, 0, 0],
+    [1, 1, 0],
+    [0, 2, 0],
+    [1, 0, 1],
+    [0, 1, 1],
+    [0, 0, 2],
+    [1, 0, 0],
+    [0, 1, 0],
+    [0, 0, 1],
+    [0, 0, 0],
 ];
 
 /// Place of a monomial by its exponents in base four.
@@ -82,7 +100,10 @@ pub(super) fn five_points(first: &[Vector3<f64>; 5], second: &[Vector3<f64>; 5])
     });
     let cubics = cubics(&basis);
     let (high, low) = (cubics.fixed_view::<10, 10>(0, 0), cubics.fixed_view::<10, 10>(0, 10));
-    let Some(solved) = DMatrix::from_fn(10, 10, |r, c| high[(r, c)]).lu().solve(&DMatrix::from_fn(10, 10, |r, c| low[(r, c)]))
+    let Some(solved) =
+        DMatrix::from_fn(10, 10, |r, c| high[(r, c)])
+            .lu()
+            .solve(&DMatrix::from_fn(10, 10, |r, c| low[(r, c)]))
     else {
         return Vec::new();
     };
@@ -124,16 +145,16 @@ fn cubics(basis: &[Matrix3<f64>; 4]) -> SMatrix<f64, 10, 20> {
         entry
     };
     let e = [0, 1, 2].map(|i| [0, 1, 2].map(|j| entry(i, j)));
-    let minor = |a: usize, b: usize| {
-        e[1][a].times(&e[2][b]).plus(&e[1][b].times(&e[2][a]), -1.0)
-    };
-    let determinant =
-        e[0][0].times(&minor(1, 2)).plus(&e[0][1].times(&minor(0, 2)), -1.0).plus(&e[0][2].times(&minor(0, 1)), 1.0);
+    let minor = |a: usize, b: usize| e[1][a].times(&e[2][b]).plus(&e[1][b].times(&e[2][a]), -1.0);
+    let determinant = e[0][0]
+        .times(&minor(1, 2))
+        .plus(&e[0][1].times(&minor(0, 2)), -1.0)
+        .plus(&e[0][2].times(&minor(0, 1)), 1.0);
     let mut square = [[Polynomial::ZERO; 3]; 3];
     for (i, row) in square.iter_mut().enumerate() {
         for (j, entry) in row.iter_mut().enumerate() {
-            for k in 0..3 {
-                *entry = entry.plus(&e[i][k].times(&e[j][k]), 1.0);
+            for (mine, theirs) in e[i].iter().zip(&e[j]) {
+                *entry = entry.plus(&mine.times(theirs), 1.0);
             }
         }
     }
@@ -145,14 +166,11 @@ fn cubics(basis: &[Matrix3<f64>; 4]) -> SMatrix<f64, 10, 20> {
         }
     };
     put(9, &determinant);
-    for i in 0..3 {
-        for j in 0..3 {
-            let mut sum = trace.times(&e[i][j]);
-            for factor in &mut sum.0 {
-                *factor = -*factor;
-            }
-            for k in 0..3 {
-                sum = sum.plus(&square[i][k].times(&e[k][j]), 2.0);
+    for (i, row) in e.iter().enumerate() {
+        for (j, entry) in row.iter().enumerate() {
+            let mut sum = Polynomial::ZERO.plus(&trace.times(entry), -1.0);
+            for (in_square, below) in square[i].iter().zip(&e) {
+                sum = sum.plus(&in_square.times(&below[j]), 2.0);
             }
             put(3 * i + j, &sum);
         }

@@ -40,7 +40,11 @@ impl RansacOptions {
         if needed.is_nan() || needed >= f64::from(self.most_samples) {
             return self.most_samples;
         }
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between one and most_samples")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "between one and most_samples"
+        )]
         let needed = needed.ceil().max(1.0) as u32;
         needed
     }

@@ -58,9 +58,8 @@ pub fn relative_pose(
     }
     let rays: Vec<(Vector3<f64>, Vector3<f64>)> =
         pairs.iter().map(|(a, b)| (cameras[0].normalised(*a), cameras[1].normalised(*b))).collect();
-    let sigmas = cameras.map(|camera| {
-        Vector3::new(sigma_px / camera.fx, sigma_px / camera.fy, 0.0).map(f64::abs)
-    });
+    let sigmas =
+        cameras.map(|camera| Vector3::new(sigma_px / camera.fx, sigma_px / camera.fy, 0.0).map(f64::abs));
     let limit = options.threshold_sigma * options.threshold_sigma;
     let mut generator = ChaCha8Rng::seed_from_u64(options.seed);
     let mut best: Option<(f64, Matrix3<f64>)> = None;
@@ -79,8 +78,7 @@ pub fn relative_pose(
                 continue;
             }
             // Where views differ little, many matrices fit the pixels; the points must lie in front of the cameras as well.
-            let agree =
-                || rays.iter().filter(|pair| sampson(&matrix, pair, &sigmas).powi(2) <= limit);
+            let agree = || rays.iter().filter(|pair| sampson(&matrix, pair, &sigmas).powi(2) <= limit);
             let Some(pose) = decomposed(&matrix, agree()) else { continue };
             let seen = agree().filter(|pair| in_front(&pose, pair)).count();
             if 4 * seen < 3 * inliers {
@@ -126,7 +124,8 @@ fn draw(generator: &mut ChaCha8Rng, count: usize) -> [usize; 5] {
     for k in 0..5 {
         loop {
             // The high half of the product: off from uniform by less than count/2⁶⁴.
-            let index = usize::try_from((u128::from(generator.next_u64()) * count as u128) >> 64).unwrap_or(0);
+            let index =
+                usize::try_from((u128::from(generator.next_u64()) * count as u128) >> 64).unwrap_or(0);
             if !sample[..k].contains(&index) {
                 sample[k] = index;
                 break;
@@ -172,8 +171,7 @@ fn decomposed<'a>(
     let (u3, v3) = (u1.cross(&u2), v1.cross(&v2));
     let mut best: Option<(usize, Pose)> = None;
     for turn in [-1.0, 1.0] {
-        let rotation =
-            u2 * turn * v1.transpose() - u1 * turn * v2.transpose() + u3 * v3.transpose();
+        let rotation = u2 * turn * v1.transpose() - u1 * turn * v2.transpose() + u3 * v3.transpose();
         let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
         for sign in [-1.0, 1.0] {
             let pose = Pose::new(rotation, axis * sign);
@@ -222,7 +220,8 @@ mod tests {
 
     fn error(found: &Pose, truth: &Pose) -> f64 {
         let direction = truth.translation().normalize();
-        (found.rotation().inverse() * truth.rotation()).vector().norm() + (found.translation() - direction).norm()
+        (found.rotation().inverse() * truth.rotation()).vector().norm()
+            + (found.translation() - direction).norm()
     }
 
     proptest! {
@@ -260,7 +259,14 @@ mod tests {
         let mut generator = ChaCha8Rng::seed_from_u64(3);
         let mut uniform = || (generator.next_u64() >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
         for run in 0..10 {
-            let truth = Pose::exp(&Vector6::new(0.1 * uniform(), 0.2 * uniform(), 0.1 * uniform(), 0.4, 0.2 * uniform(), 0.3 * uniform()));
+            let truth = Pose::exp(&Vector6::new(
+                0.1 * uniform(),
+                0.2 * uniform(),
+                0.1 * uniform(),
+                0.4,
+                0.2 * uniform(),
+                0.3 * uniform(),
+            ));
             let mut pairs = Vec::new();
             for k in 0..90 {
                 let point = Point3::new(3.0 * uniform(), 2.0 * uniform(), 4.0 + 2.0 * uniform());
@@ -272,7 +278,11 @@ mod tests {
             let options = RansacOptions { seed: run, ..RansacOptions::default() };
             let found = relative_pose([&camera, &camera], &pairs, 0.5, &options).unwrap();
             // 0.4 px of 500 over 60 points at 5°, in a narrow field of view: a few degrees of direction.
-            assert!(error(&found.second_from_first, &truth) < 0.1, "{}", error(&found.second_from_first, &truth));
+            assert!(
+                error(&found.second_from_first, &truth) < 0.1,
+                "{}",
+                error(&found.second_from_first, &truth)
+            );
             assert!(found.inliers.len() >= 55 && found.parallax > 0.03);
             assert_eq!(relative_pose([&camera, &camera], &pairs, 0.5, &options).unwrap(), found);
         }
@@ -287,7 +297,10 @@ mod tests {
         assert!(matches!(few, Err(Error::TooFew { expected: 6, found: 5, .. })));
         let mut pairs = [at(1.0); 9];
         pairs[4].1.x = f64::NAN;
-        assert!(matches!(relative_pose([&camera, &camera], &pairs, 1.0, &options), Err(Error::NotFinite { .. })));
+        assert!(matches!(
+            relative_pose([&camera, &camera], &pairs, 1.0, &options),
+            Err(Error::NotFinite { .. })
+        ));
         // One point nine times: an answer would be an invention, a hang or a panic a bug.
         let _ = relative_pose([&camera, &camera], &[at(1.0); 9], 1.0, &options);
     }

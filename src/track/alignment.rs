@@ -100,8 +100,10 @@ impl Matches<'_> {
             if settled {
                 let covariance = inverse(&fine.information)?;
                 let pose = fine.camera_from_world;
-                let distance =
-                    points.iter().map(|point| (pose * point.point).z).chain(lines.iter().map(|line| (pose * line.segment.midpoint()).z));
+                let distance = points
+                    .iter()
+                    .map(|point| (pose * point.point).z)
+                    .chain(lines.iter().map(|line| (pose * line.segment.midpoint()).z));
                 let mean = distance.map(f64::abs).sum::<f64>() / (points.len() + lines.len()) as f64;
                 let doubt = covariance.fixed_view::<3, 3>(3, 3).trace().sqrt() / mean
                     + covariance.fixed_view::<3, 3>(0, 0).trace().sqrt();
@@ -111,7 +113,8 @@ impl Matches<'_> {
                 let residual_rms = (verdict.squares / verdict.numbers as f64).sqrt();
                 let inliers = verdict.inliers;
                 let Verdict { points, lines, numbers, .. } = verdict;
-                let alignment = Alignment { camera_from_world: pose, covariance, points, lines, numbers, residual_rms };
+                let alignment =
+                    Alignment { camera_from_world: pose, covariance, points, lines, numbers, residual_rms };
                 return Some((alignment, inliers));
             }
         }

@@ -77,7 +77,13 @@ impl ClassicTracker {
     }
 
     /// Takes the places of everything with depth.
-    fn learn(&mut self, camera: &PinholeCamera, pose: &Pose, points: &[PointSighting], lines: &[LineSighting]) {
+    fn learn(
+        &mut self,
+        camera: &PinholeCamera,
+        pose: &Pose,
+        points: &[PointSighting],
+        lines: &[LineSighting],
+    ) {
         // After a predicted frame, points of the last one that was tracked stay the better known ones.
         if self.predicted == 0 {
             self.last.clear();
@@ -150,7 +156,7 @@ impl Tracker for ClassicTracker {
                 self.ever_tracked = true;
             } else {
                 self.predicted += 1;
-                if !self.ever_tracked && pairs.is_empty() {
+                if !self.ever_tracked && pairs.is_empty() && !points.is_empty() {
                     // Nothing joins the first frame to this one: the map begins here.
                     self.points.clear();
                     self.lines.clear();

@@ -42,7 +42,8 @@ pub(super) fn inverse<const N: usize>(matrix: &SMatrix<f64, N, N>) -> Option<SMa
     if !scale.iter().all(|entry| entry.is_finite() && *entry > 0.0) {
         return None;
     }
-    let mut left = SMatrix::<f64, N, N>::from_fn(|row, column| matrix[(row, column)] * scale[row] * scale[column]);
+    let mut left =
+        SMatrix::<f64, N, N>::from_fn(|row, column| matrix[(row, column)] * scale[row] * scale[column]);
     let mut right = SMatrix::<f64, N, N>::identity();
     for pivot in 0..N {
         let head = left[(pivot, pivot)];

@@ -22,8 +22,10 @@ const MOST_CONTRADICTIONS: u32 = 5;
 /// After so many predicted frames in a row nobody knows where the camera is.
 const MOST_PREDICTED: u32 = 30;
 
-/// With fewer matches than this there is nothing known in view, and the map goes on from the predicted pose.
+/// With fewer matches than this, or than this part of what was measured, there is hardly anything known in view: where they do not tell the
+/// pose, the map goes on from the predicted one.
 const FEW_MATCHES: usize = 3;
+const FEW_SHARE: usize = 4;
 
 /// How much of the map is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -147,8 +149,9 @@ impl LandmarkTracker {
                 // Whichever of the two frames was wrong, its past leads nowhere.
                 self.pending_points.remove(&sighting.id);
             }
-            let landmark = PointLandmark::from_depth(view, sighting)
-                .or_else(|| self.pending_points.entry(sighting.id).or_default().push(view, sighting, numbers));
+            let landmark = PointLandmark::from_depth(view, sighting).or_else(|| {
+                self.pending_points.entry(sighting.id).or_default().push(view, sighting, numbers)
+            });
             if let Some(landmark) = landmark {
                 self.points.insert(sighting.id, landmark);
                 if self.memory == Memory::Whole {
@@ -196,7 +199,11 @@ impl LandmarkTracker {
         self.pending_points.clear();
         self.pending_lines.clear();
         if let (Some(first), Some(last)) = (frames.first(), frames.last()) {
-            self.learn(&first.at(first.view.camera_from_world), &Seen::new(&first.points, &first.lines), None);
+            self.learn(
+                &first.at(first.view.camera_from_world),
+                &Seen::new(&first.points, &first.lines),
+                None,
+            );
             self.learn(&last.at(camera_from_world), &Seen::new(&last.points, &last.lines), None);
         }
         let mut track = None;
@@ -281,8 +288,9 @@ impl LandmarkTracker {
         let last = self.motion.last().unwrap_or(*predicted);
         self.covariance = self.predicted_covariance(&last, predicted);
         self.motion.push(frame.stamp_nanos, *predicted);
-        let few = matched[0] + matched[1] < FEW_MATCHES;
-        if few && !self.ever_tracked {
+        let measured = frame.points.len() + frame.lines.len();
+        let few = matched[0] + matched[1] < FEW_MATCHES.max(measured / FEW_SHARE);
+        if few && !self.ever_tracked && measured > FEW_MATCHES {
             // Nothing joins the first frame to this one: the map begins here.
             self.points.clear();
             self.lines.clear();
@@ -360,10 +368,11 @@ impl Tracker for LandmarkTracker {
             });
         }
         let seed = self.setting.seed ^ frame.frame_id.0.cast_unsigned().wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        if self.is_empty() && !self.ever_tracked {
-            if let Some(camera_from_world) = self.start.push(at.clone(), seed) {
-                return Ok(self.begin(camera_from_world, &pose, seed));
-            }
+        if self.is_empty()
+            && !self.ever_tracked
+            && let Some(camera_from_world) = self.start.push(at.clone(), seed)
+        {
+            return Ok(self.begin(camera_from_world, &pose, seed));
         }
         if let Some(track) = self.follow(&at, &pose, seed) {
             return Ok(track);

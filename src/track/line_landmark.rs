@@ -50,7 +50,8 @@ impl LineLandmark {
         for (k, (point, depth)) in in_camera.iter().zip([start, end]).enumerate() {
             let sigmas = (view.sigma_px, depth.sigma_m());
             // What the pose adds is common to both ends; it is added below.
-            let of_end = back_projected(&view.camera, &view.camera_from_world, point, sigmas, &Matrix6::zeros());
+            let of_end =
+                back_projected(&view.camera, &view.camera_from_world, point, sigmas, &Matrix6::zeros());
             covariance
                 .fixed_view_mut::<2, 2>(2 * k, 2 * k)
                 .copy_from(&(across.transpose() * of_end * across));
@@ -229,7 +230,10 @@ impl PendingLine {
         }
         let covariance = inverse(&information)?;
         let distance = (last.camera_from_world * segment.midpoint()).coords.norm();
-        (covariance.trace().sqrt() < most_doubt * distance)
-            .then_some(LineLandmark { segment, covariance, contradictions: 0 })
+        (covariance.trace().sqrt() < most_doubt * distance).then_some(LineLandmark {
+            segment,
+            covariance,
+            contradictions: 0,
+        })
     }
 }

@@ -9,7 +9,6 @@ use crate::geometry::{PinholeCamera, PointMatch, PointView, Pose, triangulate_po
 /// Rays of a point without depth must differ by this much before it is triangulated, radians.
 const LEAST_PARALLAX: f64 = 0.03;
 
-
 /// Views of a point without depth that are kept at most; later ones take the place of every other one.
 const MOST_VIEWS: usize = 32;
 
@@ -41,7 +40,8 @@ impl PointLandmark {
         let depth = sighting.depth?;
         let in_camera = view.camera.back_project(sighting.pixel, depth.depth_m());
         let sigmas = (view.sigma_px, depth.sigma_m());
-        let covariance = back_projected(&view.camera, &view.camera_from_world, &in_camera, sigmas, &view.covariance);
+        let covariance =
+            back_projected(&view.camera, &view.camera_from_world, &in_camera, sigmas, &view.covariance);
         let point = view.camera_from_world.inverse() * in_camera;
         point.iter().chain(covariance.iter()).all(|number| number.is_finite()).then_some(Self {
             point,
@@ -52,7 +52,12 @@ impl PointLandmark {
 
     /// The point with a measurement of it.
     pub(super) fn matched(&self, sighting: &PointSighting) -> PointMatch {
-        PointMatch { point: self.point, covariance: self.covariance, pixel: sighting.pixel, depth: sighting.depth }
+        PointMatch {
+            point: self.point,
+            covariance: self.covariance,
+            pixel: sighting.pixel,
+            depth: sighting.depth,
+        }
     }
 
     /// Takes a measurement that agrees.
@@ -129,7 +134,8 @@ impl PendingPoint {
         let mut information = Matrix3::<f64>::zeros();
         let mut cost = 0.0;
         for (view, pixel) in &self.views {
-            let at = PointMatch { point: found.point, covariance: Matrix3::zeros(), pixel: *pixel, depth: None };
+            let at =
+                PointMatch { point: found.point, covariance: Matrix3::zeros(), pixel: *pixel, depth: None };
             let residual = at.residual(&view.camera, &view.camera_from_world, view.sigma_px)?;
             let noise = residual.noise + residual.by_pose * view.covariance * residual.by_pose.transpose();
             let weight = inverse(&noise)?;
@@ -142,7 +148,10 @@ impl PendingPoint {
         let covariance = inverse(&information)?;
         let (view, _) = self.views.last()?;
         let distance = (view.camera_from_world * found.point).coords.norm();
-        (covariance.trace().sqrt() < most_doubt * distance)
-            .then_some(PointLandmark { point: found.point, covariance, contradictions: 0 })
+        (covariance.trace().sqrt() < most_doubt * distance).then_some(PointLandmark {
+            point: found.point,
+            covariance,
+            contradictions: 0,
+        })
     }
 }

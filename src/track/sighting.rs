@@ -23,9 +23,15 @@ pub(super) struct LineSighting {
     pub(super) depths: [Option<MeasuredDepth>; 2],
 }
 
+/// No image is this wide, pixels, and no scene this deep, metres: such numbers are no measurements, and their squares overflow.
+const LARGEST: f64 = 1e6;
+
 /// A measured depth with its noise; `None` where it is absent, not used, or no depth.
 fn depth(noise: &MeasurementNoise, measured: Option<f64>) -> Option<MeasuredDepth> {
     let (depth_m, sigma_m) = noise.depth(measured?)?;
+    if depth_m > LARGEST {
+        return None;
+    }
     match noise.depth {
         DepthNoise::Inverse { sigma_per_m } => Some(MeasuredDepth::Inverse { depth_m, sigma_per_m }),
         _ => Some(MeasuredDepth::Direct { depth_m, sigma_m }),
@@ -33,7 +39,7 @@ fn depth(noise: &MeasurementNoise, measured: Option<f64>) -> Option<MeasuredDept
 }
 
 fn pixel(u: f64, v: f64) -> Option<Point2<f64>> {
-    (u.is_finite() && v.is_finite()).then(|| Point2::new(u, v))
+    (u.abs() < LARGEST && v.abs() < LARGEST).then(|| Point2::new(u, v))
 }
 
 fn point_sighting(noise: &MeasurementNoise, row: &PointMeasurement) -> Option<PointSighting> {

@@ -129,7 +129,8 @@ pub fn track(
         });
     }
     let map = tracker.map();
-    estimate.points = map.points.into_iter().map(|row| MapPoint { estimate: name.to_owned(), ..row }).collect();
+    estimate.points =
+        map.points.into_iter().map(|row| MapPoint { estimate: name.to_owned(), ..row }).collect();
     estimate.lines = map.lines.into_iter().map(|row| MapLine { estimate: name.to_owned(), ..row }).collect();
     Ok(estimate)
 }

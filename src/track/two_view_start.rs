@@ -11,7 +11,7 @@ use crate::structure::FrameId;
 const LEAST_PAIRS: usize = 12;
 
 /// Median parallax of the two views, radians.
-const LEAST_PARALLAX: f64 = 0.05;
+const LEAST_PARALLAX: f64 = 0.1;
 
 /// Share of the pairs that must agree.
 const LEAST_AGREEMENT: f64 = 0.6;

@@ -76,6 +76,14 @@ pub enum Error {
         /// Poses there are.
         found: usize,
     },
+    /// More pairs than is sensible.
+    #[error("all pairs {delta} apart: expected at most {most}, found more")]
+    TooManyPairs {
+        /// The distance asked for, with its unit.
+        delta: String,
+        /// The most that are compared.
+        most: usize,
+    },
     /// A relation that these errors do not have.
     #[error("{relation} is defined for relative errors whose reference moves, and these are {found}")]
     NoRelation {

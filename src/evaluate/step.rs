@@ -9,6 +9,9 @@ use crate::geometry::Pose;
 /// The most poses among which all pairs of an angle are searched: their number grows with the square.
 pub const LARGEST_ANGLE_SEARCH: usize = 20_000;
 
+/// The most pairs of an angle that are compared.
+const MOST_PAIRS: usize = 10_000_000;
+
 /// How far the two poses of a pair are apart.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Delta {
@@ -72,7 +75,7 @@ impl Step {
     ///
     /// # Errors
     /// [`Error::Delta`] for a distance that is none, [`Error::TooManyPoses`] for all pairs of an angle among more than
-    /// [`LARGEST_ANGLE_SEARCH`] poses, [`Error::NoPairs`] when there is none.
+    /// [`LARGEST_ANGLE_SEARCH`] poses, [`Error::TooManyPairs`] for more than ten million of them, [`Error::NoPairs`] when there is none.
     pub fn pairs(&self, poses: &[Pose]) -> Result<Vec<[usize; 2]>, Error> {
         let pairs = match self.delta {
             Delta::Frames(0) => return Err(Error::Delta { expected: "at least 1 frame", found: 0.0 }),
@@ -95,11 +98,11 @@ impl Step {
             }
             Delta::Degrees(angle) => {
                 let angle = within(angle, 180.0, "an angle from 0 to 180 deg")?;
-                self.by_angle(poses, angle.to_radians())?
+                self.by_angle(poses, angle.to_radians(), MOST_PAIRS)?
             }
             Delta::Radians(angle) => {
                 let angle = within(angle, std::f64::consts::PI, "an angle from 0 to pi rad")?;
-                self.by_angle(poses, angle)?
+                self.by_angle(poses, angle, MOST_PAIRS)?
             }
         };
         if pairs.is_empty() {
@@ -108,7 +111,7 @@ impl Step {
         Ok(pairs)
     }
 
-    fn by_angle(&self, poses: &[Pose], angle: f64) -> Result<Vec<[usize; 2]>, Error> {
+    fn by_angle(&self, poses: &[Pose], angle: f64, most: usize) -> Result<Vec<[usize; 2]>, Error> {
         if !self.all_pairs {
             return Ok(consecutive(poses, angle, angle_between));
         }
@@ -122,6 +125,9 @@ impl Step {
             let ends =
                 (begin + 1..poses.len()).filter(|end| wanted.contains(&angle_between(pose, &poses[*end])));
             pairs.extend(ends.map(|end| [begin, end]));
+            if pairs.len() > most {
+                return Err(Error::TooManyPairs { delta: self.delta.to_string(), most });
+            }
         }
         Ok(pairs)
     }
@@ -222,6 +228,10 @@ mod tests {
                 }
             }
         }
+        let still = [Pose::identity(); 9];
+        let step = Step::new(Delta::Degrees(0.0)).with_all_pairs();
+        assert_eq!(step.by_angle(&still, 0.0, 36).map(|pairs| pairs.len()), Ok(36));
+        assert!(matches!(step.by_angle(&still, 0.0, 35), Err(Error::TooManyPairs { most: 35, .. })));
         let many = vec![Pose::identity(); LARGEST_ANGLE_SEARCH + 1];
         let found = Step::new(Delta::Degrees(1.0)).with_all_pairs().pairs(&many);
         assert!(matches!(found, Err(Error::TooManyPoses { .. })));

@@ -109,13 +109,12 @@ fn read(input: &Path, from: Format, names: &ImportNames) -> anyhow::Result<Impor
 
 /// The name of the sequence: as given, or that of the input without what follows the last dot.
 fn name(args: &Args) -> anyhow::Result<String> {
-    let name = match &args.name {
-        Some(name) => name.clone(),
-        None => {
-            let path = args.input.canonicalize()?;
-            let name = if path.is_dir() { path.file_name() } else { path.file_stem() };
-            name.unwrap_or_default().to_string_lossy().into_owned()
-        }
+    let name = if let Some(name) = &args.name {
+        name.clone()
+    } else {
+        let path = args.input.canonicalize()?;
+        let name = if path.is_dir() { path.file_name() } else { path.file_stem() };
+        name.unwrap_or_default().to_string_lossy().into_owned()
     };
     if name.is_empty() || name.chars().any(|letter| "/\\".contains(letter) || letter.is_control()) {
         bail!("--name: expected a name without `/`, `\\` and control characters, found {name:?}");

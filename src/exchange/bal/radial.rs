@@ -63,9 +63,9 @@ impl Radial {
                 break;
             }
             if error < 0.0 {
-                low = radius
+                low = radius;
             } else {
-                high = radius
+                high = radius;
             }
             let squared = radius * radius;
             let newton = radius - error / (1.0 + squared * (3.0 * k1 + squared * 5.0 * k2));

@@ -133,8 +133,9 @@ fn write(args: &Args, sequence: &Sequence, partial: &Partial) -> anyhow::Result<
                 Form::Plane => G2oForm::Plane,
                 Form::Space => G2oForm::Space,
             };
-            let graph = graph(args, sequence)?;
-            let (model, remarks) = to_g2o(&graph, form)?;
+            let (graph, mut remarks) = graph(args, sequence)?;
+            let (model, told) = to_g2o(&graph, form)?;
+            remarks.extend(told);
             into_file(partial, |output| Ok(exchange::write_g2o(output, &model)?))?;
             Ok((
                 remarks,
@@ -142,8 +143,9 @@ fn write(args: &Args, sequence: &Sequence, partial: &Partial) -> anyhow::Result<
             ))
         }
         Format::Bal => {
-            let graph = graph(args, sequence)?;
-            let (problem, remarks) = to_bal(&graph)?;
+            let (graph, mut remarks) = graph(args, sequence)?;
+            let (problem, told) = to_bal(&graph)?;
+            remarks.extend(told);
             into_file(partial, |output| Ok(exchange::write_bal(output, &problem)?))?;
             let [cameras, points, seen] =
                 [problem.cameras.len(), problem.points.len(), problem.observations.len()]
@@ -151,8 +153,9 @@ fn write(args: &Args, sequence: &Sequence, partial: &Partial) -> anyhow::Result<
             Ok((remarks, format!("{cameras} cameras, {points} points, {seen} observations")))
         }
         Format::Colmap => {
-            let graph = graph(args, sequence)?;
-            let (model, remarks) = to_colmap(&graph)?;
+            let (graph, mut remarks) = graph(args, sequence)?;
+            let (model, told) = to_colmap(&graph)?;
+            remarks.extend(told);
             partial.create_folder()?;
             let create = |name: &str| {
                 let path = partial.path().join(name);
@@ -186,7 +189,7 @@ fn write(args: &Args, sequence: &Sequence, partial: &Partial) -> anyhow::Result<
 }
 
 /// The graph that the arguments name, with the values of the estimate that they name.
-fn graph(args: &Args, sequence: &Sequence) -> anyhow::Result<FactorGraph> {
+fn graph(args: &Args, sequence: &Sequence) -> anyhow::Result<(FactorGraph, Vec<Remark>)> {
     let names = FactorGraph::names(sequence);
     let name = match &args.graph {
         Some(name) if names.contains(name) => name.as_str(),
@@ -205,7 +208,10 @@ fn graph(args: &Args, sequence: &Sequence) -> anyhow::Result<FactorGraph> {
         },
     };
     match args.estimate.as_deref() {
-        None => FactorGraph::of(sequence, name).with_context(|| format!("graph `{name}` is empty")),
+        None => {
+            let graph = FactorGraph::of(sequence, name);
+            Ok((graph.with_context(|| format!("graph `{name}` is empty"))?, Vec::new()))
+        }
         Some(estimate) => Ok(valued_graph(sequence, name, is_estimate(sequence, estimate))?),
     }
 }

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::ValueEnum;
+use sha2::{Digest, Sha256};
 
 use super::export::refuse_input;
 use super::{Outcome, text};
@@ -13,9 +14,12 @@ use crate::exchange::{
     ImportNames, Imported, from_bal, from_colmap, from_g2o, read_bal, read_colmap, read_g2o,
 };
 use crate::format::{self, WriteOptions};
+use crate::structure::{SourceFile, hex};
 
 /// Bytes of a file that are looked at to find its format.
 const GLANCE_BYTES: u64 = 4096;
+/// The files of a COLMAP model.
+const COLMAP_FILES: [&str; 3] = ["cameras.txt", "images.txt", "points3D.txt"];
 
 /// Import a graph or a model of another program as a sequence: its frames, cameras, measurements and a graph.
 ///
@@ -68,8 +72,9 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         None => guess(&args.input)?,
     };
     let names = ImportNames { sequence: name(args)?, graph: args.graph.clone() };
-    let Imported { sequence, remarks } =
+    let Imported { mut sequence, remarks } =
         read(&args.input, from, &names).with_context(|| args.input.display().to_string())?;
+    sequence.manifest.source.files = source_files(&args.input, from)?;
     let options = WriteOptions { force: args.force, ..WriteOptions::default() };
     format::write(&args.output, &sequence, options)?;
     let mut outcome = Outcome::Done;
@@ -107,15 +112,40 @@ fn read(input: &Path, from: Format, names: &ImportNames) -> anyhow::Result<Impor
     })
 }
 
+/// The files that were read.
+fn source_files(input: &Path, from: Format) -> anyhow::Result<Vec<SourceFile>> {
+    let paths = match from {
+        Format::Colmap => COLMAP_FILES.iter().map(|name| input.join(name)).collect(),
+        Format::G2o | Format::Bal => vec![input.to_owned()],
+    };
+    let file = |path: PathBuf| {
+        let mut hasher = Sha256::new();
+        let mut file = BufReader::new(File::open(&path)?);
+        let mut bytes = 0;
+        loop {
+            let read = file.fill_buf()?;
+            if read.is_empty() {
+                break;
+            }
+            hasher.update(read);
+            let length = read.len();
+            bytes += length as u64;
+            file.consume(length);
+        }
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        Ok(SourceFile { name, bytes, sha256: hex(&hasher.finalize()) })
+    };
+    paths.into_iter().map(file).collect()
+}
+
 /// The name of the sequence: as given, or that of the input without what follows the last dot.
 fn name(args: &Args) -> anyhow::Result<String> {
-    let name = match &args.name {
-        Some(name) => name.clone(),
-        None => {
-            let path = args.input.canonicalize()?;
-            let name = if path.is_dir() { path.file_name() } else { path.file_stem() };
-            name.unwrap_or_default().to_string_lossy().into_owned()
-        }
+    let name = if let Some(name) = &args.name {
+        name.clone()
+    } else {
+        let path = args.input.canonicalize()?;
+        let name = if path.is_dir() { path.file_name() } else { path.file_stem() };
+        name.unwrap_or_default().to_string_lossy().into_owned()
     };
     if name.is_empty() || name.chars().any(|letter| "/\\".contains(letter) || letter.is_control()) {
         bail!("--name: expected a name without `/`, `\\` and control characters, found {name:?}");
@@ -129,7 +159,7 @@ fn name(args: &Args) -> anyhow::Result<String> {
 /// The format of an input, by its name and its first words.
 fn guess(input: &Path) -> anyhow::Result<Format> {
     if input.is_dir() {
-        let files = ["cameras.txt", "images.txt", "points3D.txt"];
+        let files = COLMAP_FILES;
         if files.iter().all(|name| input.join(name).is_file()) {
             return Ok(Format::Colmap);
         }

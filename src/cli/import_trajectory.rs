@@ -21,6 +21,7 @@ use crate::structure::{Estimate, TrajectoryFormat, read_trajectory};
   my-slam box1-csv > my-slam.txt
   os import-trajectory box1 my-slam.txt --name my-slam -o box1-with-mine
   os import-trajectory box1.mcap poses.csv --from euroc --name vins -o box1-vins.mcap --t-max-diff 0.02")]
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag of the command line")]
 pub(super) struct Args {
     /// Sequence: an MCAP file or a Parquet folder.
     sequence: PathBuf,
@@ -41,10 +42,10 @@ pub(super) struct Args {
     /// Longest time between a pose and its frame, seconds.
     #[arg(long, value_name = "S", default_value_t = 0.01)]
     t_max_diff: f64,
-    /// The file holds world_from_camera, camera positions; this is what is taken for granted.
+    /// The file holds `world_from_camera`, camera positions; this is what is taken for granted.
     #[arg(long, conflicts_with = "camera_from_world")]
     world_from_camera: bool,
-    /// The file holds camera_from_world.
+    /// The file holds `camera_from_world`.
     #[arg(long)]
     camera_from_world: bool,
     /// Replace an estimate of the same name, its map too.

@@ -10,7 +10,7 @@ use crate::structure::{Camera, Conventions, Noise, Sequence};
 
 /// What `cameras.json` holds.
 #[derive(Serialize)]
-struct Cameras<'a> {
+struct Given<'a> {
     sequence: &'a str,
     conventions: &'a Conventions,
     cameras: &'a [Camera],
@@ -29,13 +29,13 @@ struct Cameras<'a> {
 /// [`Error::Unfit`] for a number that is not finite.
 pub fn to_csv(sequence: &Sequence, with_truth: bool) -> Result<Vec<TextFile>, Error> {
     let manifest = &sequence.manifest;
-    let cameras = Cameras {
+    let given = Given {
         sequence: &manifest.name,
         conventions: &manifest.conventions,
         cameras: &manifest.cameras,
         noise: manifest.noise.as_ref(),
     };
-    let json = serde_json::to_string_pretty(&cameras)
+    let json = serde_json::to_string_pretty(&given)
         .map_err(|error| Error::unfit("cameras", "what JSON can say", error))?;
     let mut files = vec![TextFile::new("cameras.json", json + "\n")];
     let mut frames = "frame_id,stamp_nanos,camera_id\n".to_owned();

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::remark::Remarks;
+use super::text_file::check_finite;
 use super::{Error, Remark};
 use crate::geometry::PinholeCamera;
 use crate::structure::{
@@ -59,6 +60,7 @@ impl Draft {
 
     /// A pose whose quaternion has length 1, as far as the specification asks.
     pub(super) fn unit(&mut self, pose: PoseRow, what: impl Fn() -> String) -> Result<PoseRow, Error> {
+        check_finite(&what, &pose.numbers())?;
         let transform = pose.pose().map_err(|error| Error::unfit(what(), "a rigid transform", error))?;
         let norm = pose.rotation_xyzw.iter().map(|part| part * part).sum::<f64>().sqrt();
         if (norm - 1.0).abs() <= QUATERNION_TOLERANCE {

@@ -10,6 +10,8 @@ use crate::structure::{
     FactorGraph, GraphFactor, LineMeasurement, PointMeasurement, PoseRow, Sequence, TrajectoryPose, registry,
 };
 
+/// Name of an estimate that stands in the association.
+const EMBEDDED: &str = "association-embedded";
 /// The clock of the release, which has no time stamps, hertz.
 const RATE_HZ: i64 = 30;
 
@@ -138,7 +140,7 @@ impl Export<'_> {
 
     fn association(&mut self) -> Result<(), Error> {
         let sequence = self.sequence;
-        let mut text = String::new();
+        let mut text = self.embedded()?;
         let mut depths = 0;
         if sequence.point_observations.is_empty() {
             for row in &sequence.point_measurements {
@@ -187,6 +189,22 @@ impl Export<'_> {
         text.push_str(&self.groups());
         self.push("observation/association.txt", text);
         Ok(())
+    }
+
+    /// The estimate that stands in the association itself, as in one published sequence.
+    fn embedded(&self) -> Result<String, Error> {
+        let mut text = String::new();
+        for row in self.sequence.trajectories.iter().filter(|row| row.estimate == EMBEDDED) {
+            line(&mut text, "Vertex: ", &[row.frame_id.0], &row.world_from_camera().numbers())?;
+        }
+        for row in self.sequence.map_points.iter().filter(|row| row.estimate == EMBEDDED) {
+            line(&mut text, "Mappoint: ", &[row.point_id.0], &[row.x, row.y, row.z])?;
+        }
+        for row in self.sequence.map_lines.iter().filter(|row| row.estimate == EMBEDDED) {
+            let ends = [row.start_x, row.start_y, row.start_z, row.end_x, row.end_y, row.end_z];
+            line(&mut text, "Mapline: ", &[row.line_id.0], &ends)?;
+        }
+        Ok(text)
     }
 
     /// The lines of parallel groups.
@@ -294,7 +312,7 @@ impl Export<'_> {
     fn estimates(&mut self) -> Result<(), Error> {
         let sequence = self.sequence;
         let mut paths: BTreeMap<&str, Vec<&TrajectoryPose>> = BTreeMap::new();
-        for row in &sequence.trajectories {
+        for row in sequence.trajectories.iter().filter(|row| row.estimate != EMBEDDED) {
             paths.entry(&row.estimate).or_default().push(row);
         }
         for (name, rows) in paths {
@@ -315,7 +333,7 @@ impl Export<'_> {
         }
         let mut maps: BTreeMap<&str, [String; 2]> = BTreeMap::new();
         let mut nameless: BTreeMap<&str, usize> = BTreeMap::new();
-        for row in &sequence.map_points {
+        for row in sequence.map_points.iter().filter(|row| row.estimate != EMBEDDED) {
             if adjusted(&row.estimate).is_some() {
                 let text = &mut maps.entry(&row.estimate).or_default()[0];
                 line(text, "Mappoint:", &[row.point_id.0], &[row.x, row.y, row.z])?;
@@ -324,7 +342,7 @@ impl Export<'_> {
             }
         }
         let recovered = self.recovered("map_lines");
-        for row in &sequence.map_lines {
+        for row in sequence.map_lines.iter().filter(|row| row.estimate != EMBEDDED) {
             if row.estimate == registry::UNREFINED && recovered.as_ref().is_none_or(|ids| !ids.is_empty()) {
                 continue;
             }

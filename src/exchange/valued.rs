@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::Error;
+use super::remark::Remarks;
+use super::{Error, Remark};
 use crate::geometry::Segment;
 use crate::structure::{
     FactorGraph, FrameId, GraphFactor, GraphLine, GraphPoint, GraphPose, LineId, MapLine, MeasuredFrame,
@@ -50,7 +51,11 @@ impl Values {
 ///
 /// # Errors
 /// [`Error::Unfit`] when there are no poses of the estimate.
-pub fn valued_graph(sequence: &Sequence, graph: &str, estimate: Option<&str>) -> Result<FactorGraph, Error> {
+pub fn valued_graph(
+    sequence: &Sequence,
+    graph: &str,
+    estimate: Option<&str>,
+) -> Result<(FactorGraph, Vec<Remark>), Error> {
     let values =
         estimate.map_or_else(|| Values::of_truth(sequence), |name| Values::of_estimate(sequence, name));
     if values.poses.is_empty() {
@@ -58,6 +63,9 @@ pub fn valued_graph(sequence: &Sequence, graph: &str, estimate: Option<&str>) ->
         return Err(Error::unfit(what, "poses", "none"));
     }
     let mut valued = FactorGraph::of(sequence, graph).unwrap_or_else(|| measured(sequence, graph, &values));
+    let sizes =
+        |graph: &FactorGraph| [graph.poses.len(), graph.points.len(), graph.lines.len(), graph.factors.len()];
+    let before = sizes(&valued);
     valued.poses.retain_mut(|row| match values.poses.get(&row.frame_id) {
         Some(pose) => {
             *row = GraphPose::new(std::mem::take(&mut row.graph), row.frame_id, row.fixed, *pose);
@@ -87,7 +95,15 @@ pub fn valued_graph(sequence: &Sequence, graph: &str, estimate: Option<&str>) ->
             && row.point_id.is_none_or(|id| values.points.contains_key(&id))
             && row.line_id.is_none_or(|id| values.lines.contains_key(&id))
     });
-    Ok(valued)
+    let after = sizes(&valued);
+    let mut remarks = Remarks::default();
+    for (place, what) in ["poses", "points", "lines", "factors"].into_iter().enumerate() {
+        remarks.lost(
+            before[place] - after[place],
+            format!("{what} are left out: the estimate lacks their vertices"),
+        );
+    }
+    Ok((valued, remarks.into_vec()))
 }
 
 /// A graph of all measurements; its vertices get their values afterwards.

@@ -33,11 +33,16 @@ pub fn from_bal(problem: &BalProblem, names: &ImportNames) -> Result<Imported, E
     for observation in &problem.observations {
         let Some(camera) = problem.cameras.get(observation.camera) else { continue };
         let flat = observation.pixel.map(|part| part / camera.focal);
-        let Some(flat) = Radial(camera.radial).undistort(flat) else {
+        let ideal = Radial(camera.radial).undistort(flat).map(|flat| {
+            let pixel = flat.map(|part| camera.focal * part);
+            (flat, pixel, Radial(camera.radial).weight(flat))
+        });
+        let is_usable = |numbers: &[f64]| numbers.iter().all(|number| number.is_finite());
+        let ideal = ideal.filter(|(_, pixel, weight)| is_usable(pixel) && is_usable(weight));
+        let Some((flat, [x, y], _)) = ideal else {
             unseen += 1;
             continue;
         };
-        let [x, y] = flat.map(|part| camera.focal * part);
         let most = &mut reach[observation.camera];
         *most = [most[0].max(x.abs()), most[1].max(y.abs())];
         seen.push((observation, flat, [x, y]));
@@ -75,8 +80,7 @@ pub fn from_bal(problem: &BalProblem, names: &ImportNames) -> Result<Imported, E
         let radial = Radial(problem.cameras[observation.camera].radial);
         let information = (!radial.is_none()).then(|| {
             // y points the other way here, which turns the sign beside the diagonal.
-            let [a, b, c] = radial.jacobian([flat[0], -flat[1]]);
-            vec![a * a + b * b, b * (a + c), b * b + c * c]
+            radial.weight([flat[0], -flat[1]]).to_vec()
         });
         let (frame, point) = (FrameId(id(observation.camera)), PointId(id(observation.point)));
         draft.add_view(frame, point, pixel, information);

@@ -30,6 +30,12 @@ impl Radial {
         [factor + slope * x * x, slope * x * y, factor + slope * y * y]
     }
 
+    /// `JᵀJ` of the derivative `J`: the weight, at an ideal position, of a pixel that was seen with weight 1; xx, xy, yy.
+    pub(super) fn weight(self, at: [f64; 2]) -> [f64; 3] {
+        let [a, b, c] = self.jacobian(at);
+        [a * a + b * b, b * (a + c), b * b + c * c]
+    }
+
     /// The ideal position of one that is seen; `None` where the lens sends none there.
     ///
     /// The radius is sought where the distortion still grows with it: beyond, one pixel has several positions.
@@ -63,9 +69,9 @@ impl Radial {
                 break;
             }
             if error < 0.0 {
-                low = radius
+                low = radius;
             } else {
-                high = radius
+                high = radius;
             }
             let squared = radius * radius;
             let newton = radius - error / (1.0 + squared * (3.0 * k1 + squared * 5.0 * k2));

@@ -60,6 +60,21 @@ proptest! {
     }
 
     #[test]
+    fn what_is_imported_is_finite(numbers in prop::array::uniform14("[1-3]|1e-300|1e300|-1e300|0.5")) {
+        let text = format!("1 1 1\n0 0 {}", numbers.join("\n"));
+        let problem = read_bal(text.as_bytes()).unwrap();
+        if let Ok(imported) = from_bal(&problem, &names()) {
+            for row in &imported.sequence.graph_factors {
+                let weights = row.information.as_deref().unwrap_or_default();
+                prop_assert!(row.measurement.iter().chain(weights).all(|number| number.is_finite()));
+            }
+            for row in &imported.sequence.graph_poses {
+                prop_assert!(row.world_from_camera().numbers().iter().all(|number| number.is_finite()));
+            }
+        }
+    }
+
+    #[test]
     fn distortion_is_undone_where_it_grows(k1 in -0.3..0.3_f64, k2 in -0.1..0.3_f64, x in -0.8..0.8_f64, y in -0.8..0.8_f64) {
         let radial = Radial([k1, k2]);
         let squared = x * x + y * y;

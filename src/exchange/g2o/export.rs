@@ -180,12 +180,11 @@ impl Export<'_> {
             .map_err(|_| Error::unfit(what(), "7 numbers", factor.measurement.len()))?;
         let pose = checked(&measured, what)?;
         let identity = upper_of_identity(6);
-        let ours = match factor.information.as_deref() {
-            Some(numbers) => finite(numbers, 21, what)?,
-            None => {
-                remarks.said(1, "relative poses without information got the identity, 1/rad² and 1/m²");
-                identity.as_slice()
-            }
+        let ours = if let Some(numbers) = factor.information.as_deref() {
+            finite(numbers, 21, what)?
+        } else {
+            remarks.said(1, "relative poses without information got the identity, 1/rad² and 1/m²");
+            identity.as_slice()
         };
         let (kind, mut numbers, weights) = if self.poses == G2oKind::VertexSe2 {
             let flat = flattened(&measured);

@@ -95,7 +95,7 @@ impl<'a> Import<'a> {
                 self.draft.add_point(point.0, [*x, *y, *z]);
             }
             (G2oKind::VertexSe2, [x, y, theta]) => self.draft.add_pose(id, fixed, lifted(*x, *y, *theta))?,
-            (_, [pose @ ..]) => {
+            (_, pose) => {
                 self.draft.add_pose(id, fixed, pose_row(pose))?;
                 if let [_, _, _, _, _, _, _, fx, fy, cx, cy, _] = element.numbers.as_slice() {
                     self.camera(FrameId(id), [*fx, *fy, *cx, *cy])?;

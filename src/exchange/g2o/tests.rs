@@ -79,6 +79,9 @@ proptest! {
             graph.elements.iter_mut().flat_map(|element| &mut element.ids).for_each(|id| *id %= 3);
         }
         let _ = from_g2o(&graph, &names()).map(|imported| {
+            let finite = |numbers: &[f64]| assert!(numbers.iter().all(|number| number.is_finite()), "{numbers:?}");
+            imported.sequence.graph_poses.iter().for_each(|row| finite(&row.world_from_camera().numbers()));
+            imported.sequence.graph_factors.iter().for_each(|row| finite(row.information.as_deref().unwrap_or_default()));
             let graph = FactorGraph::of(&imported.sequence, "g");
             graph.map(|graph| to_g2o(&graph, G2oForm::AsItIs).map(drop))
         });

@@ -42,20 +42,15 @@ pub fn read_g2o(input: impl BufRead) -> Result<G2oGraph, Error> {
             continue;
         };
         let mut element = G2oElement::new(*kind, &[], Vec::with_capacity(*numbers));
-        match ids {
-            Some(count) => {
-                for _ in 0..*count {
-                    element.ids.push(fields.id("an id")?);
-                }
-            }
-            None => {
+        element.ids.push(fields.id("an id")?);
+        if let Some(count) = ids {
+            for _ in 1..*count {
                 element.ids.push(fields.id("an id")?);
-                while let Some(word) = fields.word_or_end() {
-                    let id = word.parse().ok().filter(|id: &i64| *id >= 0);
-                    element
-                        .ids
-                        .push(id.ok_or_else(|| fields.wrong("an id, an integer of at least 0", word))?);
-                }
+            }
+        } else {
+            while let Some(word) = fields.word_or_end() {
+                let id = word.parse().ok().filter(|id: &i64| *id >= 0);
+                element.ids.push(id.ok_or_else(|| fields.wrong("an id, an integer of at least 0", word))?);
             }
         }
         for place in 1..=*numbers {

@@ -17,10 +17,9 @@ use super::shared_line::{ParallelFactor, RightAngleFactor, SharedLineFactor, sha
 use super::summary::Summary;
 use super::whitening::{depth_sight, ends_depth_sight, ends_sight, pixel_sight};
 use crate::geometry::{PluckerLine, Segment};
-use crate::structure::{Estimate, FactorGraph, Iteration, MapLine, MapPoint, PoseRow, TrajectoryPose};
-use nalgebra::{Matrix6, Point3, Vector3, Vector6};
 use crate::structure::{
     Estimate, Iteration, MapLine, MapPoint, PoseRow, TrajectoryPose,
+};
 use nalgebra::{Matrix3x4, Matrix6, Point2, Point3, SMatrix, Vector3, Vector6};
 use std::marker::PhantomData;
 use std::sync::Arc;
@@ -232,10 +231,7 @@ impl Estimation {
         summary.weak.clear();
         summary.unconstrained.clear();
         let mut numbers = vec![0; observations.frames.len()];
-        observations
-            .point_views
-            .iter()
-            .for_each(|view| numbers[view.frame] += 2 + usize::from(view.depth.is_some()));
+        observations.point_views.iter().for_each(|view| numbers[view.frame] += 2 + usize::from(view.depth.is_some()));
         observations.line_views.iter().for_each(|view| {
             numbers[view.frame] += 2 + view.depths.iter().flatten().count();
         });
@@ -350,14 +346,6 @@ impl Estimation {
         }
     }
 
-    /// Whether another round would change what is estimated.
-    pub(super) fn needs_another(
-        &self,
-        options: &Options,
-        _observations: &Observations,
-        round: usize,
-    ) -> bool {
-        options.method == Method::Structural && round == 0
     /// Moment and direction of a free line, of some common scale, and their derivative by a step.
     pub(super) fn free_line(&self, variable: Variable) -> (Vector3<f64>, Vector3<f64>, SMatrix<f64, 6, 4>) {
         let values = self.problem.values();
@@ -369,6 +357,7 @@ impl Estimation {
         };
         (moment, direction, derivative)
     }
+
     /// The direction of a free line, length one, and its derivative by a step.
     pub(super) fn direction_of(&self, variable: Variable) -> (Vector3<f64>, Matrix3x4<f64>) {
         let (_, direction, derivative) = self.free_line(variable);
@@ -396,11 +385,6 @@ impl Estimation {
         };
         let mut of_pose = covariances.poses.drain(..);
         let trajectory = observations.frames.iter().map(|frame| {
-            TrajectoryPose::new(
-                name.clone(),
-                frame.frame_id,
-                PoseRow::from(&frame.camera_from_world.inverse()),
-            )
             let pose = PoseRow::from(&frame.camera_from_world.inverse());
             let row = TrajectoryPose::new(name.clone(), frame.frame_id, pose);
             TrajectoryPose { covariance: of_pose.next(), ..row }
@@ -470,19 +454,14 @@ fn diagonal_root(sigma_rotation_rad: f64, sigma_translation_m: f64) -> Matrix6<f
 }
 
 /// The line of a moment and a direction of any scale, directed as another is.
-pub(super) fn line_of(
-    moment: Vector3<f64>,
-    direction: Vector3<f64>,
-    like: &PluckerLine,
-) -> Option<PluckerLine> {
+pub(super) fn line_of(moment: Vector3<f64>, direction: Vector3<f64>, like: &PluckerLine) -> Option<PluckerLine> {
     let length = direction.norm();
     let sign = if direction.dot(&like.direction) < 0.0 { -1.0 } else { 1.0 };
     let direction = direction * (sign / length);
     let moment = moment * (sign / length);
     // Both come from one form, so that they are perpendicular up to rounding.
     let moment = moment - direction * direction.dot(&moment);
-    (moment.iter().chain(&direction).all(|number| number.is_finite()))
-        .then_some(PluckerLine { moment, direction })
+    (moment.iter().chain(&direction).all(|number| number.is_finite())).then_some(PluckerLine { moment, direction })
 }
 
 /// The piece of a line between the feet of a segment's ends.

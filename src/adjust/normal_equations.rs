@@ -170,11 +170,6 @@ impl NormalEquations {
         let first_number = |at: usize| structure.edge_start[structure.edges.start[at]];
         let first_block = block_start[reduced];
         let solved_ties = split(&mut self.solved_ties, bounds.iter().map(|at| first_number(*at)));
-        let gradients =
-            split(&mut self.solved_gradient, bounds.iter().map(|at| step_start[reduced + at] - first_step));
-        let inverses =
-            split(&mut self.inverses, bounds.iter().map(|at| block_start[reduced + at] - first_block));
-        let (blocks, ties, gradient, diagonal) = (&self.blocks, &self.ties, &self.gradient, &self.diagonal);
         let inverses = split(&mut self.inverses, bounds.iter().map(|at| block_start[reduced + at] - first_block));
         let (blocks, ties, diagonal) = (&self.blocks, &self.ties, &self.diagonal);
         solved_ties
@@ -189,9 +184,6 @@ impl NormalEquations {
                     let size = structure.eliminated_sizes[at];
                     let steps = step_start[variable]..step_start[variable + 1];
                     let block = &blocks[block_start[variable]..block_start[variable + 1]];
-                    let inverse =
-                        &mut inverses[block_start[variable] - block_start[reduced + first]..][..size * size];
-                    let diagonal = &diagonal[steps.clone()];
                     let inverse = &mut inverses[block_start[variable] - block_start[reduced + first]..][..size * size];
                     let diagonal = &diagonal[steps];
                     let positive = match size {
@@ -205,9 +197,6 @@ impl NormalEquations {
                     if !positive {
                         return false;
                     }
-                    let solved =
-                        &mut solved_gradient[step_start[variable] - step_start[reduced + first]..][..size];
-                    multiply(inverse, &gradient[steps], size, 1, solved);
                     for edge in structure.edges.start[at]..structure.edges.start[at + 1] {
                         let numbers = structure.edge_start[edge]..structure.edge_start[edge + 1];
                         let columns = numbers.len() / size;
@@ -268,15 +257,6 @@ impl NormalEquations {
                     let tie = &ties[structure.edge_start[other]..structure.edge_start[other + 1]];
                     let rows = structure.reduced_sizes[row];
                     match (inner, rows, size) {
-                        (3, 6, 6) => {
-                            subtract::<3, 6, 6>(tie, solved, values, row == column, |c| places.at(row, c))
-                        }
-                        (6, 3, 3) => {
-                            subtract::<6, 3, 3>(tie, solved, values, row == column, |c| places.at(row, c))
-                        }
-                        (4, 6, 6) => {
-                            subtract::<4, 6, 6>(tie, solved, values, row == column, |c| places.at(row, c))
-                        }
                         (3, 6, 6) => subtract::<3, 6, 6>(tie, solved, values, row == column, |c| places.at(row, c)),
                         (6, 3, 3) => subtract::<6, 3, 3>(tie, solved, values, row == column, |c| places.at(row, c)),
                         (2, 6, 6) => subtract::<2, 6, 6>(tie, solved, values, row == column, |c| places.at(row, c)),
@@ -329,14 +309,6 @@ impl NormalEquations {
         for at in 0..structure.eliminated.len() {
             let size = structure.eliminated_sizes[at];
             let begin = self.step_start[reduced + at] - rows;
-            let inverse = self.inverse(at);
-            multiply(
-                inverse,
-                &eliminated_right[begin..begin + size],
-                size,
-                1,
-                &mut eliminated_step[begin..begin + size],
-            );
             let target = &mut eliminated_step[begin..begin + size];
             multiply(self.inverse(at), &eliminated_right[begin..begin + size], size, 1, target);
         }
@@ -348,9 +320,7 @@ impl NormalEquations {
                 let begin = self.step_start[reduced + at] - rows;
                 let tie = &self.ties[structure.edge_start[edge]..structure.edge_start[edge + 1]];
                 let size = target.len();
-                for (k, solved) in
-                    eliminated_step[begin..begin + structure.eliminated_sizes[at]].iter().enumerate()
-                {
+                for (k, solved) in eliminated_step[begin..begin + structure.eliminated_sizes[at]].iter().enumerate() {
                     for (target, entry) in target.iter_mut().zip(&tie[k * size..(k + 1) * size]) {
                         *target -= entry * solved;
                     }

@@ -1,8 +1,8 @@
 //! The bound: how accurate any method could be on what was measured.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use nalgebra::{Point2, Point3};
+use nalgebra::{Point2, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::run::adjust_options;
@@ -12,7 +12,7 @@ use crate::covisibility::{GraphOptions, reprojection_graph};
 use crate::geometry::{PinholeCamera, Pose, triangulate_point};
 use crate::structure::{
     Estimate, FactorGraph, FrameId, LineId, MapLine, MapPoint, MeasuredFrame, MeasurementNoise, PointId,
-    Sequence, TrajectoryPose, registry,
+    Sequence, StructuralGroup, TrajectoryPose, registry,
 };
 
 /// What the measurements allow.
@@ -22,6 +22,8 @@ pub struct Bound {
     pub translation_rms_m: f64,
     /// Root mean square of the absolute error of rotation after alignment, radians.
     pub rotation_rms_rad: f64,
+    /// Whether the alignment scales: for methods whose scale is free.
+    pub is_scaled: bool,
 }
 
 /// The bounds of a sequence, by method; trackers and `structural-ba` share theirs.
@@ -33,10 +35,12 @@ pub(super) fn bounds(sequence: &Sequence, plan: &Plan, store: &Store) -> Result<
     let seed = plan.seeds.first().copied().unwrap_or(0);
     let sequence = measured(sequence, &plan.noise, seed);
     let mut found = BTreeMap::new();
-    if let Ok(bound) = bound_of(&sequence, Method::StructuralBa) {
-        for method in plan.methods.iter().filter(|method| !is_monocular(**method)) {
-            found.insert(method.name().to_owned(), bound);
-        }
+    let mut bounds: BTreeMap<Method, Option<Bound>> = BTreeMap::new();
+    for method in &plan.methods {
+        // Trackers may use all that the structural adjustment uses.
+        let basis = if method.is_adjustment() { *method } else { Method::StructuralBa };
+        let bound = bounds.entry(basis).or_insert_with(|| bound_of(&sequence, basis).ok());
+        found.extend(bound.map(|bound| (method.name().to_owned(), bound)));
     }
     store.keep_bound(title, &found)
 }
@@ -117,18 +121,63 @@ fn triangulated(sequence: &Sequence, known: &BTreeMap<PointId, Point3<f64>>) -> 
     views.into_iter().filter_map(|(id, views)| Some((id, triangulate_point(&views)?.point))).collect()
 }
 
+/// Lines of one group whose directions differ by more are not parallel as they were measured, radians: the specification's tolerance.
+const PARALLEL_RAD: f64 = 1e-3;
+
+/// The groups as far as they hold for the lines that were measured; a group of groups is left out where one of its lines is.
+fn true_groups(sequence: &Sequence, truth: &Estimate) -> Vec<StructuralGroup> {
+    let directions: BTreeMap<LineId, Vector3<f64>> =
+        truth.lines.iter().filter_map(|row| Some((row.line_id, row.segment().direction()?))).collect();
+    let mut kept = Vec::new();
+    let mut released: BTreeSet<LineId> = BTreeSet::new();
+    for group in sequence.structural_groups.iter().filter(|group| group.kind == registry::PARALLEL) {
+        let Some(common) = group.direction() else { continue };
+        let holds = |line: &LineId| {
+            let sine = directions.get(line).map(|direction| direction.cross(&common).norm());
+            sine.is_some_and(|sine| sine <= PARALLEL_RAD)
+        };
+        let (line_ids, out): (Vec<LineId>, Vec<LineId>) = group.line_ids.iter().partition(|line| holds(line));
+        released.extend(out);
+        if line_ids.len() > 1 {
+            kept.push(StructuralGroup { line_ids, ..group.clone() });
+        }
+    }
+    let whole = |group: &&StructuralGroup| {
+        group.is_made_of_groups() && group.line_ids.iter().all(|line| !released.contains(line))
+    };
+    kept.extend(sequence.structural_groups.iter().filter(whole).cloned());
+    kept
+}
+
 /// The graph of what was measured, at the truth.
 fn graph(sequence: &Sequence) -> Result<FactorGraph, String> {
-    let (cameras, groups) = (&sequence.manifest.cameras, &sequence.structural_groups);
+    let truth = truth(sequence);
+    let groups = true_groups(sequence, &truth);
     let noise = MeasurementNoise::declared(&sequence.manifest);
-    let frames = MeasuredFrame::of(sequence);
-    reprojection_graph(&frames, &truth(sequence), cameras, noise, groups, &GraphOptions::default())
+    let (frames, cameras) = (MeasuredFrame::of(sequence), &sequence.manifest.cameras);
+    reprojection_graph(&frames, &truth, cameras, noise, &groups, &GraphOptions::default())
         .map(|(graph, _)| graph)
         .map_err(|cause| cause.to_string())
 }
 
-/// TEMPORARY
-pub fn bound_of(sequence: &Sequence, _method: Method) -> Result<Bound, String> {
-    let _ = graph(sequence)?;
-    Err("none".into())
+/// The bound of a method on the measurements of a sequence, at its true poses and landmarks.
+///
+/// For a method whose scale is free, after Sim(3) alignment; for the others after SE(3) alignment. Groups of lines are taken as
+/// they are declared only where their lines are parallel as measured.
+///
+/// * `sequence` — measurements as of [`measured`]; true poses and landmarks.
+///
+/// # Errors
+/// In words, where no graph can be built, or the measurements leave something open.
+pub fn bound_of(sequence: &Sequence, method: Method) -> Result<Bound, String> {
+    let graph = graph(sequence)?;
+    let monocular = is_monocular(method);
+    let alignment = if monocular { adjust::Alignment::Sim3 } else { adjust::Alignment::Se3 };
+    let found =
+        adjust::bound(&graph, &adjust_options(method), alignment).map_err(|cause| cause.to_string())?;
+    Ok(Bound {
+        translation_rms_m: found.translation_rms_m,
+        rotation_rms_rad: found.rotation_rms_rad,
+        is_scaled: monocular,
+    })
 }

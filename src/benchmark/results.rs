@@ -31,15 +31,18 @@ pub struct Row {
     pub seconds: Option<Spread>,
     /// The bound that measurements set to the method: root mean square of absolute errors of translation, centimetres.
     pub bound_cm: Option<f64>,
+    /// Whether the bound is one after Sim(3) alignment.
+    pub bound_is_scaled: bool,
     /// What the paper prints.
     pub paper: Option<PaperCell>,
 }
 
 impl Row {
-    /// How many times the bound the median of the errors is.
+    /// How many times the bound the median of the errors is, both with the bound's alignment.
     #[must_use]
     pub fn over_bound(&self) -> Option<f64> {
-        Some(self.ape_rmse_cm?.median / self.bound_cm.filter(|bound| *bound > 0.0)?)
+        let errors = if self.bound_is_scaled { self.ape_sim3_rmse_cm? } else { self.ape_rmse_cm? };
+        Some(errors.median / self.bound_cm.filter(|bound| *bound > 0.0)?)
     }
 
     /// How many times the paper's error the median of the errors is.
@@ -150,6 +153,7 @@ fn row(sequence: &str, method: &str, cells: &[Cell], bound: Option<&Bound>) -> R
             .unwrap_or(0),
         seconds: Spread::of(cells.iter().map(|cell| cell.seconds)),
         bound_cm: bound.map(|bound| bound.translation_rms_m * 100.0),
+        bound_is_scaled: bound.is_some_and(|bound| bound.is_scaled),
         paper: in_paper.and_then(|name| paper(sequence, PaperMethod(name))).cloned(),
     }
 }

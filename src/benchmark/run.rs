@@ -212,13 +212,18 @@ impl Given<'_> {
     }
 }
 
+/// Part of the cost by which a step has to lower it: what Ceres takes by default.
+const FUNCTION_TOLERANCE: f64 = 1e-6;
+
 /// The usual options of a method.
 pub(super) fn adjust_options(method: Method) -> adjust::Options {
-    adjust::Options::of(match method {
+    let mut options = adjust::Options::of(match method {
         Method::PointBa => adjust::Method::Point,
         Method::PointLineBa => adjust::Method::PointLine,
         _ => adjust::Method::Structural,
-    })
+    });
+    options.solver.function_tolerance = FUNCTION_TOLERANCE;
+    options
 }
 
 fn failed(reason: &str) -> Outcome {

@@ -13,6 +13,7 @@ use crate::benchmark::{
     self, Method, Plan, Results, Store, cells_table, curves_table, html, markdown, summary_table,
 };
 use crate::format;
+use crate::plot::{NamedNumbers, convergence_figure};
 use crate::simulate::noise::{NoiseModel, NoiseRecipe};
 use crate::structure::ResultTable;
 
@@ -161,14 +162,28 @@ fn write(folder: &Path, results: &Results, label: &str) -> anyhow::Result<Vec<St
     for (name, text) in
         [("table.md", markdown(results, label)), ("report.html", html(results, label, &pictures))]
     {
-        crate::format::write_text(&folder.join(name), &text, true)?;
+        format::write_text(&folder.join(name), &text, true)?;
         names.push(name.to_owned());
     }
     Ok(names)
 }
 
-/// A picture of the convergence of every sequence with an optimiser.
+/// A picture of the convergence on every sequence with an optimiser, by the first seed.
 fn curves(results: &Results) -> Vec<(String, String)> {
-    let _ = results;
-    Vec::new()
+    let mut pictures = Vec::new();
+    for sequence in results.sequences() {
+        let mut runs: Vec<(&str, Vec<f64>)> = Vec::new();
+        for cell in results.cells.iter().filter(|cell| cell.key.sequence == sequence && !cell.curve.is_empty()) {
+            if runs.iter().all(|(method, _)| *method != cell.key.method) {
+                let costs = cell.curve.iter().filter(|point| point.accepted).map(|point| point.cost);
+                runs.push((&cell.key.method, costs.collect()));
+            }
+        }
+        if !runs.is_empty() {
+            let title = format!("Convergence on {sequence}");
+            let named: Vec<_> = runs.iter().map(|(name, costs)| NamedNumbers { name, numbers: costs }).collect();
+            pictures.push((title.clone(), convergence_figure(&title, &named)));
+        }
+    }
+    pictures
 }

@@ -173,7 +173,9 @@ fn curves(results: &Results) -> Vec<(String, String)> {
     let mut pictures = Vec::new();
     for sequence in results.sequences() {
         let mut runs: Vec<(&str, Vec<f64>)> = Vec::new();
-        for cell in results.cells.iter().filter(|cell| cell.key.sequence == sequence && !cell.curve.is_empty()) {
+        for cell in
+            results.cells.iter().filter(|cell| cell.key.sequence == sequence && !cell.curve.is_empty())
+        {
             if runs.iter().all(|(method, _)| *method != cell.key.method) {
                 let costs = cell.curve.iter().filter(|point| point.accepted).map(|point| point.cost);
                 runs.push((&cell.key.method, costs.collect()));
@@ -181,7 +183,8 @@ fn curves(results: &Results) -> Vec<(String, String)> {
         }
         if !runs.is_empty() {
             let title = format!("Convergence on {sequence}");
-            let named: Vec<_> = runs.iter().map(|(name, costs)| NamedNumbers { name, numbers: costs }).collect();
+            let named: Vec<_> =
+                runs.iter().map(|(name, costs)| NamedNumbers { name, numbers: costs }).collect();
             pictures.push((title.clone(), convergence_figure(&title, &named)));
         }
     }

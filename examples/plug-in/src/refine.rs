@@ -46,7 +46,9 @@ pub fn refine_points(
     let mut problem = Problem::new();
     let (mut factors, mut placed) = (Vec::new(), Vec::new());
     for (index, row) in estimate.points.iter().enumerate() {
-        let Some(views) = views.get(&row.point_id).filter(|views| views.len() >= LEAST_VIEWS) else { continue };
+        let Some(views) = views.get(&row.point_id).filter(|views| views.len() >= LEAST_VIEWS) else {
+            continue;
+        };
         let world_from_anchor = views[0].0;
         let place = world_from_anchor.inverse() * Point3::new(row.x, row.y, row.z);
         let distance = place.coords.norm();
@@ -69,8 +71,8 @@ pub fn refine_points(
     for (index, point, world_from_anchor) in placed {
         let numbers = problem.values().of(point);
         let distance = numbers[3].exp();
-        let place =
-            world_from_anchor * Point3::new(numbers[0] * distance, numbers[1] * distance, numbers[2] * distance);
+        let place = world_from_anchor
+            * Point3::new(numbers[0] * distance, numbers[1] * distance, numbers[2] * distance);
         let row = &mut estimate.points[index];
         (row.x, row.y, row.z) = (place.x, place.y, place.z);
     }

@@ -44,8 +44,11 @@ impl Factor for Seen {
             let (fx, fy) = (self.camera.fx / z / self.sigma_px, self.camera.fy / z / self.sigma_px);
             let by_seen = Matrix2x3::new(fx, 0.0, -fx * x / z, 0.0, fy, -fy * y / z);
             let columns = across(&direction) * distance;
-            let by_step =
-                Matrix3::from_columns(&[columns.column(0).into(), columns.column(1).into(), direction * distance]);
+            let by_step = Matrix3::from_columns(&[
+                columns.column(0).into(),
+                columns.column(1).into(),
+                direction * distance,
+            ]);
             let by_step = by_seen * self.camera_from_anchor.rotation_matrix() * by_step;
             // Row by row.
             jacobian.copy_from_slice(by_step.transpose().as_slice());

@@ -92,11 +92,11 @@ fn laid_on(pairs: &[(Vector3<f64>, Vector3<f64>)]) -> Option<Pose> {
         return None;
     }
     let count = pairs.len() as f64;
-    let sum = pairs.iter().fold((Vector3::zeros(), Vector3::zeros()), |sum, pair| (sum.0 + pair.0, sum.1 + pair.1));
+    let sum =
+        pairs.iter().fold((Vector3::zeros(), Vector3::zeros()), |sum, pair| (sum.0 + pair.0, sum.1 + pair.1));
     let (camera, world) = (sum.0 / count, sum.1 / count);
-    let covariance = pairs
-        .iter()
-        .fold(Matrix3::zeros(), |sum, (x, y)| sum + (y - world) * (x - camera).transpose());
+    let covariance =
+        pairs.iter().fold(Matrix3::zeros(), |sum, (x, y)| sum + (y - world) * (x - camera).transpose());
     let svd = covariance.svd(true, true);
     let (u, v_t) = (svd.u?, svd.v_t?);
     let mirrored = (u * v_t).determinant() < 0.0;

@@ -1,0 +1,178 @@
+//! The whole way: a recipe, measurements, tracking, a graph, adjustment, figures.
+//!
+//! Without noise it ends at zero, and the estimates are the same when the truth is taken out of the file.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use open_structure::evaluate::{Alignment, absolute};
+use open_structure::format::{self, WriteOptions};
+use open_structure::geometry::Pose;
+use open_structure::structure::{
+    Estimate, FrameId, LineObservation, PointObservation, Sequence, StructuralGroup, registry,
+};
+
+fn os(folder: &Path, arguments: &[&str]) -> (Option<i32>, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_os")).current_dir(folder).args(arguments).output().unwrap();
+    let words =
+        String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    (output.status.code(), words)
+}
+
+#[track_caller]
+fn done(folder: &Path, arguments: &[&str]) -> String {
+    let (code, words) = os(folder, arguments);
+    assert_eq!(code, Some(0), "os {}: {words}", arguments.join(" "));
+    words
+}
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("walk.toml"), recipe()).unwrap();
+        done(folder.path(), &["simulate", "walk.toml", "-o", "walk"]);
+        Self(folder)
+    }
+
+    fn path(&self) -> &Path {
+        self.0.path()
+    }
+
+    fn read(&self, name: &str) -> Sequence {
+        format::read(self.path().join(name)).unwrap()
+    }
+}
+
+/// The recipe of box1 with fewer frames.
+fn recipe() -> String {
+    let text =
+        fs::read_to_string(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("sequences/box1.toml")).unwrap();
+    let text = text.split("[expected]").next().unwrap().to_owned();
+    assert!(text.contains("frames = 447"));
+    text.replace("frames = 447", "frames = 90").replace("count = 130", "count = 200")
+}
+
+fn poses(estimate: &Estimate) -> Vec<(FrameId, Pose)> {
+    let pose = |row: &open_structure::structure::TrajectoryPose| row.world_from_camera().pose().unwrap();
+    estimate.trajectory.iter().map(|row| (row.frame_id, pose(row))).collect()
+}
+
+fn truth(sequence: &Sequence) -> Vec<(FrameId, Pose)> {
+    let pose = |frame: &open_structure::structure::Frame| frame.world_from_camera().unwrap().pose().unwrap();
+    sequence.frames.iter().map(|frame| (frame.frame_id, pose(frame))).collect()
+}
+
+/// Everything that a method makes of a sequence, by the name of the estimate.
+const WAY: &[(&str, &[&str])] = &[
+    ("frame-to-frame", &["track", "--method", "frame-to-frame"]),
+    ("map-to-frame", &["track", "--method", "map-to-frame"]),
+    ("frame-to-frame-classic", &["track", "--method", "frame-to-frame", "--classic"]),
+    ("map-to-frame-classic", &["track", "--method", "map-to-frame", "--classic"]),
+    ("", &["graph", "--estimate", "map-to-frame", "--name", "tracked"]),
+    ("point-ba", &["adjust", "--graph", "tracked", "--method", "point"]),
+    ("point-line-ba", &["adjust", "--graph", "tracked", "--method", "point-line"]),
+    ("structural-ba", &["adjust", "--graph", "tracked", "--method", "structural"]),
+    ("", &["graph", "--estimate", "frame-to-frame", "--kind", "pose-graph", "--name", "loops"]),
+    ("pose-graph", &["adjust", "--graph", "loops", "--method", "pose-graph"]),
+];
+
+/// Walks the whole way from a sequence; each step adds to the one before.
+fn walk(folder: &Path, from: &str, first_pose: Option<&str>) -> String {
+    let mut last = from.to_owned();
+    for (step, (_, arguments)) in WAY.iter().enumerate() {
+        let next = format!("{from}-{step}");
+        let mut all = vec![arguments[0], &last, "-o", &next];
+        all.extend(&arguments[1..]);
+        if let Some(pose) = first_pose.filter(|_| arguments[0] == "track") {
+            all.extend(["--first-pose", pose]);
+        }
+        done(folder, &all);
+        last = next;
+    }
+    last
+}
+
+#[test]
+fn without_noise_every_method_ends_at_zero() {
+    let folder = Folder::new();
+    done(folder.path(), &["measure", "walk", "-o", "exact", "--noise", "none"]);
+    let last = walk(folder.path(), "exact", None);
+    done(folder.path(), &["validate", &last]);
+    let sequence = folder.read(&last);
+    let truth = truth(&sequence);
+    for (name, _) in WAY.iter().filter(|(name, _)| !name.is_empty()) {
+        let estimate = Estimate::of(&sequence, name).unwrap();
+        let found = absolute(&truth, &poses(&estimate), Alignment::NONE).unwrap();
+        assert_eq!(estimate.trajectory.len(), sequence.frames.len(), "{name}");
+        // Metres and radians: rounding alone.
+        assert!(found.translation.rmse() < 1e-9, "{name}: {:e} m", found.translation.rmse());
+        assert!(found.rotation.rmse() < 1e-9, "{name}: {:e} rad", found.rotation.rmse());
+        let point = |id| sequence.point_landmarks.iter().find(|row| row.point_id == id).unwrap();
+        for row in &estimate.points {
+            let at = point(row.point_id);
+            let away = (row.x - at.x).abs().max((row.y - at.y).abs()).max((row.z - at.z).abs());
+            assert!(away < 1e-8, "{name}, {}: {away:e} m", row.point_id);
+        }
+    }
+    let said = done(folder.path(), &["evaluate", &last, "--json"]);
+    assert!(said.contains("structural-ba"), "{said}");
+}
+
+#[test]
+fn estimates_do_not_change_when_the_truth_is_taken_out() {
+    let folder = Folder::new();
+    done(folder.path(), &["measure", "walk", "-o", "noisy", "--noise", "first-release", "--seed", "3"]);
+    let mut blind = folder.read("noisy");
+    let first =
+        blind.frames[0].world_from_camera().unwrap().numbers().map(|number| number.to_string()).join(",");
+    for frame in &mut blind.frames {
+        *frame =
+            open_structure::structure::Frame::new(frame.frame_id, frame.stamp_nanos, frame.camera_id, None);
+    }
+    blind.point_landmarks.clear();
+    blind.line_landmarks.clear();
+    blind.point_observations = Vec::<PointObservation>::new();
+    blind.line_observations = Vec::<LineObservation>::new();
+    blind.point_correspondences.clear();
+    blind.line_correspondences.clear();
+    blind.frame_statistics.clear();
+    blind.structural_groups =
+        blind.structural_groups.iter().map(StructuralGroup::without_direction).collect();
+    blind.manifest.tables.clear();
+    format::write(&folder.path().join("blind"), &blind, WriteOptions::default()).unwrap();
+
+    let with = folder.read(&walk(folder.path(), "noisy", None));
+    let without = folder.read(&walk(folder.path(), "blind", Some(&first)));
+    assert!(without.frames.iter().all(|frame| frame.world_from_camera().is_none()));
+    for (name, _) in WAY.iter().filter(|(name, _)| !name.is_empty()) {
+        assert_eq!(Estimate::of(&with, name), Estimate::of(&without, name), "{name}");
+    }
+    assert_eq!(with.graph_factors, without.graph_factors);
+    assert_eq!(with.graph_poses, without.graph_poses);
+    assert!(with.tracking.iter().all(|row| row.state != registry::LOST));
+}
+
+#[test]
+fn noise_is_what_estimates_differ_by_and_each_step_of_the_way_comes_closer() {
+    let folder = Folder::new();
+    done(folder.path(), &["measure", "walk", "-o", "noisy", "--noise", "first-release", "--seed", "5"]);
+    let sequence = folder.read(&walk(folder.path(), "noisy", None));
+    let truth = truth(&sequence);
+    let error = |name: &str| {
+        let estimate = Estimate::of(&sequence, name).unwrap();
+        absolute(&truth, &poses(&estimate), Alignment::SE3).unwrap().translation.rmse()
+    };
+    // A map is better than the frame before, covariances are better than averages, all together better than one at a time.
+    assert!(
+        error("map-to-frame") < error("frame-to-frame"),
+        "{} {}",
+        error("map-to-frame"),
+        error("frame-to-frame")
+    );
+    assert!(error("frame-to-frame") < error("frame-to-frame-classic"));
+    assert!(error("structural-ba") < error("map-to-frame-classic"));
+    assert!(error("structural-ba") < 0.05, "{} m", error("structural-ba"));
+}

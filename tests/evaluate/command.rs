@@ -309,7 +309,7 @@ fn files_of_all_formats_meet_each_other() {
             "after",
         ),
         (vec![text(&reference), text(&other), "-d", "0"], "frames"),
-        (vec![text(&reference), text(&other), "-d", "-1", "-u", "m"], "0 m or more"),
+        (vec![text(&reference), text(&other), "--rpe-delta=-1", "-u", "m"], "0 m or more"),
     ] {
         let output = os(&[&["evaluate", "--files"], &arguments[..]].concat());
         let code = output.status.code();

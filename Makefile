@@ -1,4 +1,4 @@
-# make demo   build, simulate a sequence, render images and convert them, convert the committed sample, validate, look at all
+# make demo   build; simulate, track, adjust, evaluate; render images and convert them; convert the committed sample; validate all
 # make test   every test
 # make lint   formatting, clippy, documentation, dependencies
 
@@ -16,11 +16,11 @@ FUZZ_ARGS ?=
 # Tests, benchmarks and examples stop at what they did not expect, and need not be pretty.
 TESTS_MAY := $(addprefix --allow clippy::,pedantic unwrap_used expect_used print_stdout print_stderr)
 
-.PHONY: help setup demo test lint bench fuzz conformance-corpus spec
+.PHONY: help setup demo test lint bench paper-table fuzz conformance-corpus spec
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
-	@echo 'make bench | fuzz | conformance-corpus | spec | setup'
+	@echo 'make bench | paper-table | fuzz | conformance-corpus | spec | setup'
 
 setup: ## what the other targets need
 	@.ci/setup
@@ -40,6 +40,10 @@ lint:
 
 bench:
 	cargo bench --workspace --locked
+
+# The paper's table on the sequences of the first release; an hour and more, and it goes on where it was cut off.
+paper-table:
+	@benches/paper-table
 
 # cargo-fuzz asks for a nightly compiler's flags; the stable one takes them when told to. No sanitizer: our
 # code is safe throughout, so panics, hangs and memory are what there is to find.

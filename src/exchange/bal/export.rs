@@ -95,7 +95,7 @@ pub fn to_bal(graph: &FactorGraph) -> Result<(BalProblem, Vec<Remark>), Error> {
     remarks.lost(others, "factors of other kinds than points are left out: BAL has none");
     remarks.lost(graph.lines.len(), "lines are left out: BAL has none");
     let fixed = graph.poses.iter().filter(|row| row.fixed).count();
-    remarks.lost(fixed, "fixed poses are free in BAL: it has no gauge");
+    remarks.said(fixed, "fixed poses are free in BAL: it has no gauge");
     Ok((problem, remarks.into_vec()))
 }
 

@@ -151,7 +151,7 @@ pub fn to_colmap(graph: &FactorGraph) -> Result<(ColmapModel, Vec<Remark>), Erro
     );
     remarks.lost(graph.lines.len(), "lines are left out: a model has none");
     let fixed = graph.poses.iter().filter(|row| row.fixed).count();
-    remarks.lost(fixed, "fixed poses are free in a model: it has no gauge");
+    remarks.said(fixed, "fixed poses are free in a model: it has no gauge");
     let mirrored =
         "cameras had fy below 0: the model is mirrored, y of the world and of every camera negated";
     remarks.said(up, mirrored);

@@ -44,6 +44,9 @@ pub struct FrameTrack {
     /// The pose, metres.
     pub world_from_camera: Pose,
     /// Covariance over the tangent `[rotation; translation]` applied on the left of `world_from_camera`, where it is known.
+    ///
+    /// That of the built-in trackers is the frame's own: against a map, errors that the whole map has in common, such as drift since the
+    /// first frame, are not in it; from frame to frame, it is the sum over all steps, which is too large by what neighbouring steps share.
     pub covariance: Option<Matrix6<f64>>,
     /// Points and lines that were matched to something known.
     pub matched: [usize; 2],

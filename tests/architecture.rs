@@ -33,6 +33,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "format",
             "simulate",
             "datasets",
+            "unfinished",
             "track",
             "covisibility",
             "adjust",

@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use crate::{format, simulate};
+use crate::format;
+use crate::simulate;
 
 /// What keeps a benchmark from being run; a method that fails on a sequence is a result, not an error.
 #[derive(Debug, thiserror::Error)]

@@ -76,7 +76,8 @@ pub fn bound(graph: &FactorGraph, options: &Options, alignment: Alignment) -> Re
         .zip(&centres)
         .map(|(frame, centre)| {
             let mut turned = -adjoint(&frame.camera_from_world.inverse());
-            let shift = turned.fixed_view::<3, 6>(3, 0) - centre.cross_matrix() * turned.fixed_view::<3, 6>(0, 0);
+            let shift =
+                turned.fixed_view::<3, 6>(3, 0) - centre.cross_matrix() * turned.fixed_view::<3, 6>(0, 0);
             turned.fixed_view_mut::<3, 6>(3, 0).copy_from(&shift);
             turned
         })
@@ -108,7 +109,7 @@ pub fn bound(graph: &FactorGraph, options: &Options, alignment: Alignment) -> Re
         // (GᵀG)⁻¹ with what a straight path leaves open left out.
         let gram = tangents.transpose() * &tangents;
         let scale = gram.diagonal().amax().max(f64::MIN_POSITIVE);
-        let inverse = gram.pseudo_inverse(1e-12 * scale).map_err(|_| Error::Singular)?;
+        let inverse = gram.clone().pseudo_inverse(1e-12 * scale).map_err(|_| Error::Singular)?;
         let mut functional = DMatrix::zeros(uncertainty.unknowns(), freedom);
         for ((at, variable), moved) in estimation.poses.iter().enumerate().zip(&moves) {
             let Some(range) = uncertainty.range(*variable) else { continue };

@@ -105,7 +105,9 @@ fn covariance(
         return;
     };
     findings.add(RuleId::CovariancePositive, Some(table), || {
-        Detail::new(format!("{expected} numbers of a positive semi-definite matrix"), wrong).row(row).id(key())
+        Detail::new(format!("{expected} numbers of a positive semi-definite matrix"), wrong)
+            .row(row)
+            .id(key())
     });
 }
 

@@ -131,8 +131,14 @@ pub(crate) fn sample() -> Sequence {
         },
     ];
     let estimate = registry::MAP_TO_FRAME.to_owned();
-    sequence.map_points =
-        vec![MapPoint { estimate: estimate.clone(), point_id: point, x: 1.0, y: 2.0, z: 5.0, covariance: None }];
+    sequence.map_points = vec![MapPoint {
+        estimate: estimate.clone(),
+        point_id: point,
+        x: 1.0,
+        y: 2.0,
+        z: 5.0,
+        covariance: None,
+    }];
     sequence.map_lines = vec![MapLine {
         estimate,
         line_id: line,

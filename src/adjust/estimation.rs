@@ -64,7 +64,8 @@ impl Estimation {
             .iter()
             .map(|frame| problem.add(&pose_space, &PoseSpace::numbers_of(&frame.camera_from_world)))
             .collect();
-        let mut estimation = Self { problem, poses, points: Vec::new(), lines: Vec::new(), line_kind: options.lines };
+        let mut estimation =
+            Self { problem, poses, points: Vec::new(), lines: Vec::new(), line_kind: options.lines };
         estimation.add_points(observations, options)?;
         match options.lines {
             LineKind::Orthonormal => {

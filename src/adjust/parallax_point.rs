@@ -116,7 +116,11 @@ impl<S: PointSight<R>, const R: usize, const V: usize> Factor for ParallaxFactor
     fn evaluate(&self, values: &Values<'_>, residual: &mut [f64], jacobian: Option<&mut [f64]>) -> bool {
         let (main, associate) = (V - 3, V - 2);
         let pose = |at: usize| values.of(self.variables[at]);
-        let found = ParallaxPoint::new(&centre(pose(main)), &centre(pose(associate)), values.of(self.variables[V - 1]));
+        let found = ParallaxPoint::new(
+            &centre(pose(main)),
+            &centre(pose(associate)),
+            values.of(self.variables[V - 1]),
+        );
         let (r, t) = (rotation(pose(self.frame)), translation(pose(self.frame)));
         let p = r * found.place + t;
         let Some((seen, by_point)) = self.sight.look(&p) else { return false };

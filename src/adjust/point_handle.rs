@@ -35,7 +35,12 @@ impl PointHandle {
                 rotation(host).transpose() * (point_in_host(values.of(*point)).0 - translation(host))
             }
             Self::Parallax { point, main, associate } => {
-                ParallaxPoint::new(&centre(values.of(*main)), &centre(values.of(*associate)), values.of(*point)).place
+                ParallaxPoint::new(
+                    &centre(values.of(*main)),
+                    &centre(values.of(*associate)),
+                    values.of(*point),
+                )
+                .place
             }
         }
     }
@@ -73,7 +78,13 @@ struct Factors<S, const R: usize> {
 
 impl<S: PointSight<R> + 'static, const R: usize> Factors<S, R> {
     fn new() -> Self {
-        Self { place: Vec::new(), hosted: Vec::new(), host: Vec::new(), parallax: Vec::new(), anchor: Vec::new() }
+        Self {
+            place: Vec::new(),
+            hosted: Vec::new(),
+            host: Vec::new(),
+            parallax: Vec::new(),
+            anchor: Vec::new(),
+        }
     }
 
     fn push(&mut self, handle: PointHandle, frame: Variable, sight: S) {
@@ -122,7 +133,8 @@ impl Estimation {
                     PointHandle::Hosted { point: variable, host: self.poses[first] }
                 }
                 (PointForm::Parallax, Some(first)) => {
-                    let centre = |frame: usize| observations.frames[frame].camera_from_world.inverse().translation();
+                    let centre =
+                        |frame: usize| observations.frames[frame].camera_from_world.inverse().translation();
                     let main = centre(first);
                     let forms = frames.iter().filter_map(|frame| {
                         Some((*frame, ParallaxPoint::numbers_of(&main, &centre(*frame), &place)?))

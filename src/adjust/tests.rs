@@ -128,7 +128,7 @@ fn ring(frames: usize, sigma: f64, off: f64) -> (FactorGraph, Vec<Pose>) {
     let mut graph = scene.graph();
     let truth = scene.poses();
     graph.factors.clear();
-    let mut draw = super::scene::Draw::new(5);
+    let mut draw = scene::Draw::new(5);
     for frame in 0..frames {
         for ahead in [1, 3] {
             let other = (frame + ahead) % frames;
@@ -293,7 +293,7 @@ fn the_bound_is_what_estimates_reach() {
     for seed in 0..runs {
         // The same room; only the noise differs.
         let mut graph = scene.graph();
-        let mut noise = super::scene::Draw::new(seed + 77);
+        let mut noise = scene::Draw::new(seed + 77);
         let clean = Scene { sigma_px: 0.0, sigma_m: 0.0, ..scene }.graph();
         for (factor, clean) in graph.factors.iter_mut().zip(&clean.factors) {
             for (k, (number, clean)) in factor.measurement.iter_mut().zip(&clean.measurement).enumerate() {

@@ -122,8 +122,7 @@ impl BlockPattern {
         let stack = MemStack::new(&mut memory);
         let tree = simplicial::prefactorize_symbolic_cholesky(&mut tree, &mut counts, upper, stack);
         // The fill of blocks of unequal size needs the rows, not only their count.
-        let factor =
-            simplicial::factorize_simplicial_symbolic_cholesky(upper, tree, &counts, stack).ok()?;
+        let factor = simplicial::factorize_simplicial_symbolic_cholesky(upper, tree, &counts, stack).ok()?;
         let (starts, rows) = (factor.col_ptr(), factor.row_idx());
         let mut cost = 0.0;
         for (column, block) in order.iter().enumerate() {
@@ -157,7 +156,8 @@ mod tests {
 
     #[test]
     fn an_order_and_its_inverse_give_the_pattern_back() {
-        let pattern = BlockPattern::of(5, |column, name| [1, 3, 4].iter().for_each(|row| name(column.max(*row))));
+        let pattern =
+            BlockPattern::of(5, |column, name| [1, 3, 4].iter().for_each(|row| name(column.max(*row))));
         let order = [3, 1, 4, 0, 2];
         let mut back = [0; 5];
         order.iter().enumerate().for_each(|(at, block)| back[*block] = at);

@@ -76,7 +76,8 @@ pub fn bound(graph: &FactorGraph, options: &Options, alignment: Alignment) -> Re
         .zip(&centres)
         .map(|(frame, centre)| {
             let mut turned = -adjoint(&frame.camera_from_world.inverse());
-            let shift = turned.fixed_view::<3, 6>(3, 0) - centre.cross_matrix() * turned.fixed_view::<3, 6>(0, 0);
+            let shift =
+                turned.fixed_view::<3, 6>(3, 0) - centre.cross_matrix() * turned.fixed_view::<3, 6>(0, 0);
             turned.fixed_view_mut::<3, 6>(3, 0).copy_from(&shift);
             turned
         })

@@ -3,6 +3,7 @@
 use super::error::Error;
 use super::estimation::{Estimation, LineHandle};
 use super::observations::Observations;
+use super::point_handle::PointHandle;
 use super::pose_factor::adjoint;
 use super::problem::Variable;
 use super::shared_line::shared_plucker;
@@ -35,10 +36,14 @@ impl Estimation {
             triangle(&(turn * block * turn.transpose()))
         });
         let poses = poses.collect();
-        let points = self.point_covariances(observations, &uncertainty);
+        let points = self.point_covariances(&uncertainty);
         let mut lines = Vec::new();
         for (line, handle) in observations.lines.iter().zip(&self.lines) {
-            let functional = self.ends_by_step(handle, &uncertainty, [line.segment.start, line.segment.end].map(|end| end.coords));
+            let functional = self.ends_by_step(
+                handle,
+                &uncertainty,
+                [line.segment.start, line.segment.end].map(|end| end.coords),
+            );
             let solved = uncertainty.times(&functional);
             let covariance = functional.transpose() * solved;
             lines.push(triangle(&SMatrix::<f64, 6, 6>::from_fn(|row, column| {
@@ -48,13 +53,42 @@ impl Estimation {
         Ok(Covariances { poses, points, lines })
     }
 
-    fn point_covariances(&self, _: &Observations, uncertainty: &Uncertainty) -> Vec<Vec<f64>> {
-        let blocks = uncertainty.blocks(&self.problem, &self.points);
-        blocks.iter().map(|block| triangle(&block.fixed_view::<3, 3>(0, 0).into_owned())).collect()
+    fn point_covariances(&self, uncertainty: &Uncertainty) -> Vec<Vec<f64>> {
+        let mut plain = Vec::new();
+        for handle in &self.points {
+            if let PointHandle::Place(variable) = handle {
+                plain.push(*variable);
+            }
+        }
+        let mut blocks = uncertainty.blocks(&self.problem, &plain).into_iter();
+        let values = self.problem.values();
+        let covariance = |handle: &PointHandle| {
+            if let PointHandle::Place(_) = handle {
+                let block = blocks.next().unwrap_or_else(|| DMatrix::zeros(3, 3));
+                return triangle(&block.fixed_view::<3, 3>(0, 0).into_owned());
+            }
+            let mut functional = DMatrix::zeros(uncertainty.unknowns(), 3);
+            for (variable, first, by_step) in handle.by_steps(&values) {
+                if let Some(range) = uncertainty.range(variable) {
+                    let mut rows = functional.rows_mut(range.start + first, 3);
+                    rows += by_step.transpose();
+                }
+            }
+            let covariance = functional.transpose() * uncertainty.times(&functional);
+            triangle(&SMatrix::<f64, 3, 3>::from_fn(|row, column| {
+                0.5 * (covariance[(row, column)] + covariance[(column, row)])
+            }))
+        };
+        self.points.iter().map(covariance).collect()
     }
 
     /// How both ends of a line move across it by the step of all variables, one column for each coordinate.
-    fn ends_by_step(&self, handle: &LineHandle, uncertainty: &Uncertainty, ends: [Vector3<f64>; 2]) -> DMatrix<f64> {
+    fn ends_by_step(
+        &self,
+        handle: &LineHandle,
+        uncertainty: &Uncertainty,
+        ends: [Vector3<f64>; 2],
+    ) -> DMatrix<f64> {
         let values = self.problem.values();
         let (direction, derivative, variables): (Vector3<f64>, SMatrix<f64, 6, 4>, Vec<(Variable, usize)>) =
             match handle {
@@ -63,7 +97,8 @@ impl Estimation {
                     (direction, derivative, vec![(*variable, 0)])
                 }
                 LineHandle::Shared { direction, offset, origin } => {
-                    let (_, along, derivative) = shared_plucker(values.of(*direction), values.of(*offset), origin);
+                    let (_, along, derivative) =
+                        shared_plucker(values.of(*direction), values.of(*offset), origin);
                     (along, derivative, vec![(*direction, 0), (*offset, 2)])
                 }
             };

@@ -125,7 +125,8 @@ impl Elimination {
     }
 
     fn of(problem: &Problem, eliminate: &[bool], reduced: Vec<usize>, reduced_sizes: Vec<usize>) -> Self {
-        let eliminated: Vec<usize> = (0..problem.len()).filter(|v| eliminate[*v] && !problem.held[*v]).collect();
+        let eliminated: Vec<usize> =
+            (0..problem.len()).filter(|v| eliminate[*v] && !problem.held[*v]).collect();
         let eliminated_sizes: Vec<usize> = eliminated.iter().map(|v| freedom(problem, *v)).collect();
         let mut places = vec![Place::Held; problem.len()];
         reduced.iter().enumerate().for_each(|(at, v)| places[*v] = Place::Reduced(at));
@@ -212,7 +213,11 @@ impl Elimination {
 }
 
 fn pair(incidence: &Incidence, other: &Incidence, named: usize) -> Pair {
-    Pair { incidence: *incidence, other_column: other.column, other: u32::try_from(named).unwrap_or(u32::MAX) }
+    Pair {
+        incidence: *incidence,
+        other_column: other.column,
+        other: u32::try_from(named).unwrap_or(u32::MAX),
+    }
 }
 
 fn freedom(problem: &Problem, variable: usize) -> usize {
@@ -254,7 +259,8 @@ fn choices(problem: &Problem) -> Vec<Vec<bool>> {
             for (at, a) in variables.iter().enumerate() {
                 for b in &variables[at + 1..] {
                     if !problem.held[a.index()] && !problem.held[b.index()] {
-                        let (a, b) = (problem.space_of[a.index()] as usize, problem.space_of[b.index()] as usize);
+                        let (a, b) =
+                            (problem.space_of[a.index()] as usize, problem.space_of[b.index()] as usize);
                         meets[a][b] = true;
                         meets[b][a] = true;
                     }
@@ -283,7 +289,8 @@ fn pairs(problem: &Problem, eliminate: &[bool]) -> f64 {
     for layout in &problem.layout.batches {
         layout.variables.iter().for_each(|variable| factors[variable.index()] += 1);
     }
-    let count = |(factors, eliminate): (&u32, &bool)| if *eliminate { f64::from(*factors).powi(2) } else { 0.0 };
+    let count =
+        |(factors, eliminate): (&u32, &bool)| if *eliminate { f64::from(*factors).powi(2) } else { 0.0 };
     factors.iter().zip(eliminate).map(count).sum::<f64>() / 2.0
 }
 

@@ -10,16 +10,14 @@ use super::minimise::Step;
 use super::observations::Observations;
 use super::options::{LineKind, Options, Parallelism};
 use super::parametrisation::{DirectionSpace, LineSpace, PoseSpace, VectorSpace};
-use super::point_factor::PointFactor;
+use super::point_handle::PointHandle;
 use super::pose_factor::{PosePriorFactor, RelativePoseFactor, ScaleFactor};
 use super::problem::{Problem, Variable};
 use super::shared_line::{ParallelFactor, RightAngleFactor, SharedLineFactor, shared_plucker};
 use super::summary::Summary;
-use super::whitening::{depth_sight, ends_depth_sight, ends_sight, pixel_sight};
+use super::whitening::{ends_depth_sight, ends_sight};
 use crate::geometry::{PluckerLine, Segment};
-use crate::structure::{
-    Estimate, Iteration, MapLine, MapPoint, PoseRow, TrajectoryPose,
-};
+use crate::structure::{Estimate, Iteration, MapLine, MapPoint, PoseRow, TrajectoryPose};
 use nalgebra::{Matrix3x4, Matrix6, Point2, Point3, SMatrix, Vector3, Vector6};
 use std::marker::PhantomData;
 use std::sync::Arc;
@@ -37,7 +35,7 @@ const ENOUGH_FOR_A_POSE: usize = 6;
 pub(super) struct Estimation {
     pub(super) problem: Problem,
     pub(super) poses: Vec<Variable>,
-    pub(super) points: Vec<Variable>,
+    pub(super) points: Vec<PointHandle>,
     pub(super) lines: Vec<LineHandle>,
     line_kind: LineKind,
 }
@@ -66,22 +64,19 @@ impl Estimation {
             .iter()
             .map(|frame| problem.add(&pose_space, &PoseSpace::numbers_of(&frame.camera_from_world)))
             .collect();
-        let point_space = Arc::new(VectorSpace(3));
-        let points: Vec<Variable> = observations
-            .points
-            .iter()
-            .map(|point| problem.add(&point_space, point.position.coords.as_slice()))
-            .collect();
-        let mut estimation = Self { problem, poses, points, lines: Vec::new(), line_kind: options.lines };
+        let mut estimation =
+            Self { problem, poses, points: Vec::new(), lines: Vec::new(), line_kind: options.lines };
         estimation.add_points(observations, options)?;
         match options.lines {
-            LineKind::Orthonormal => estimation.add_lines(&Arc::new(LineSpace), observations, grouping, options)?,
+            LineKind::Orthonormal => {
+                estimation.add_lines(&Arc::new(LineSpace), observations, grouping, options)?
+            }
             LineKind::Endpoints => {
                 estimation.add_lines(&Arc::new(EndpointsSpace), observations, grouping, options)?;
-            },
+            }
             LineKind::PluckerCayley => {
                 estimation.add_lines(&Arc::new(CayleySpace), observations, grouping, options)?;
-            },
+            }
         }
         estimation.add_relatives(observations, options)?;
         estimation.add_priors(observations, options)?;
@@ -92,25 +87,6 @@ impl Estimation {
             .map(|index| estimation.problem.spaces[estimation.problem.space_of[index] as usize].freedom())
             .sum();
         Ok(estimation)
-    }
-
-    fn add_points(&mut self, observations: &Observations, options: &Options) -> Result<(), Error> {
-        let (mut pixels, mut depths) = (Vec::new(), Vec::new());
-        for view in &observations.point_views {
-            let variables = [self.poses[view.frame], self.points[view.point]];
-            match view.depth {
-                Some(depth) => {
-                    let sight = depth_sight(view, depth, &observations.noise);
-                    depths.push(PointFactor::<_, 3> { variables, sight });
-                }
-                None => {
-                    let sight = pixel_sight(view, &observations.noise);
-                    pixels.push(PointFactor::<_, 2> { variables, sight });
-                }
-            }
-        }
-        self.problem.add_factors(pixels, options.loss)?;
-        self.problem.add_factors(depths, options.loss)
     }
 
     fn add_lines<L: LineForm>(
@@ -172,13 +148,14 @@ impl Estimation {
         self.problem.add_factors(shared_ends, options.loss)?;
         self.problem.add_factors(shared_depths, options.loss)?;
         if let Parallelism::Soft { sigma_rad } = options.parallelism {
-            let tied = self.lines.iter().zip(&grouping.of_line).filter_map(|(line, group)| match (line, group) {
-                (LineHandle::Free(line), Some(group)) => {
-                    let variables = [*line, directions[*group]];
-                    Some(ParallelFactor { variables, sigma_rad, form: PhantomData::<L> })
-                }
-                _ => None,
-            });
+            let tied =
+                self.lines.iter().zip(&grouping.of_line).filter_map(|(line, group)| match (line, group) {
+                    (LineHandle::Free(line), Some(group)) => {
+                        let variables = [*line, directions[*group]];
+                        Some(ParallelFactor { variables, sigma_rad, form: PhantomData::<L> })
+                    }
+                    _ => None,
+                });
             let tied = tied.collect();
             self.problem.add_factors(tied, options.loss)?;
         }
@@ -231,7 +208,10 @@ impl Estimation {
         summary.weak.clear();
         summary.unconstrained.clear();
         let mut numbers = vec![0; observations.frames.len()];
-        observations.point_views.iter().for_each(|view| numbers[view.frame] += 2 + usize::from(view.depth.is_some()));
+        observations
+            .point_views
+            .iter()
+            .for_each(|view| numbers[view.frame] += 2 + usize::from(view.depth.is_some()));
         observations.line_views.iter().for_each(|view| {
             numbers[view.frame] += 2 + view.depths.iter().flatten().count();
         });
@@ -289,7 +269,8 @@ impl Estimation {
         observations.relatives.iter().for_each(|view| has_depth[components[view.frame]] = true);
         let mut factors = Vec::new();
         for part in 0..components.len() {
-            let frames: Vec<usize> = (0..components.len()).filter(|frame| components[*frame] == part).collect();
+            let frames: Vec<usize> =
+                (0..components.len()).filter(|frame| components[*frame] == part).collect();
             let mut held = frames.iter().filter(|frame| self.problem.is_held(self.poses[**frame]));
             let Some(first) = held.next() else { continue };
             let has_two = held.any(|frame| (centres[*frame] - centres[*first]).norm() > 1e-9);
@@ -319,9 +300,8 @@ impl Estimation {
         for (frame, variable) in observations.frames.iter_mut().zip(&self.poses) {
             frame.camera_from_world = PoseSpace::pose_of(values.of(*variable));
         }
-        for (point, variable) in observations.points.iter_mut().zip(&self.points) {
-            let numbers = values.of(*variable);
-            point.position = Point3::new(numbers[0], numbers[1], numbers[2]);
+        for (point, handle) in observations.points.iter_mut().zip(&self.points) {
+            point.position = Point3::from(handle.place(&values));
         }
         for (line, handle) in observations.lines.iter_mut().zip(&self.lines) {
             let (moment, direction) = match handle {
@@ -351,7 +331,9 @@ impl Estimation {
         let values = self.problem.values();
         let numbers = values.of(variable);
         let ((moment, direction), derivative) = match self.line_kind {
-            LineKind::Orthonormal => (<LineSpace as LineForm>::plucker(numbers), LineSpace::derivative(numbers)),
+            LineKind::Orthonormal => {
+                (<LineSpace as LineForm>::plucker(numbers), LineSpace::derivative(numbers))
+            }
             LineKind::Endpoints => (EndpointsSpace::plucker(numbers), EndpointsSpace::derivative(numbers)),
             LineKind::PluckerCayley => (CayleySpace::plucker(numbers), CayleySpace::derivative(numbers)),
         };
@@ -454,14 +436,19 @@ fn diagonal_root(sigma_rotation_rad: f64, sigma_translation_m: f64) -> Matrix6<f
 }
 
 /// The line of a moment and a direction of any scale, directed as another is.
-pub(super) fn line_of(moment: Vector3<f64>, direction: Vector3<f64>, like: &PluckerLine) -> Option<PluckerLine> {
+pub(super) fn line_of(
+    moment: Vector3<f64>,
+    direction: Vector3<f64>,
+    like: &PluckerLine,
+) -> Option<PluckerLine> {
     let length = direction.norm();
     let sign = if direction.dot(&like.direction) < 0.0 { -1.0 } else { 1.0 };
     let direction = direction * (sign / length);
     let moment = moment * (sign / length);
     // Both come from one form, so that they are perpendicular up to rounding.
     let moment = moment - direction * direction.dot(&moment);
-    (moment.iter().chain(&direction).all(|number| number.is_finite())).then_some(PluckerLine { moment, direction })
+    (moment.iter().chain(&direction).all(|number| number.is_finite()))
+        .then_some(PluckerLine { moment, direction })
 }
 
 /// The piece of a line between the feet of a segment's ends.

@@ -142,8 +142,6 @@ impl<F: Factor> Batch for Kind<F> {
     fn squared(&self, factor: usize, values: &Values<'_>) -> Option<f64> {
         let mut residual = [0.0; MOST_RESIDUALS];
         let residual = &mut residual[..F::RESIDUALS];
-        self.factors[factor]
-            .evaluate(values, residual, None)
-            .then(|| residual.iter().map(|r| r * r).sum())
+        self.factors[factor].evaluate(values, residual, None).then(|| residual.iter().map(|r| r * r).sum())
     }
 }

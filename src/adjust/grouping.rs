@@ -59,8 +59,11 @@ impl Grouping {
         for group in graph.groups.iter().filter(|group| !group.is_made_of_groups()) {
             let ids: BTreeSet<LineId> = group.line_ids.iter().copied().collect();
             // A line in two groups is tied by the first.
-            let lines: Vec<usize> =
-                ids.iter().filter_map(|id| places.get(id).copied()).filter(|line| taken.insert(*line)).collect();
+            let lines: Vec<usize> = ids
+                .iter()
+                .filter_map(|id| places.get(id).copied())
+                .filter(|line| taken.insert(*line))
+                .collect();
             let (kept, direction, released) =
                 agreeing(group.group_id, &lines, observations, estimation, &uncertainty);
             summary.released.extend(released);
@@ -87,8 +90,11 @@ impl Grouping {
         let mut taken = BTreeSet::new();
         for group in graph.groups.iter().filter(|group| !group.is_made_of_groups()) {
             let ids: BTreeSet<LineId> = group.line_ids.iter().copied().collect();
-            let lines: Vec<usize> =
-                ids.iter().filter_map(|id| places.get(id).copied()).filter(|line| taken.insert(*line)).collect();
+            let lines: Vec<usize> = ids
+                .iter()
+                .filter_map(|id| places.get(id).copied())
+                .filter(|line| taken.insert(*line))
+                .collect();
             let direction = |line: usize| observations.lines[line].line.direction;
             let Some(common) = consensus(&lines, direction) else { continue };
             let (kept, off): (Vec<usize>, Vec<usize>) =

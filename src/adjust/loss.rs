@@ -46,7 +46,9 @@ impl Loss {
                 if left <= 0.0 {
                     (limit / 3.0, 0.0)
                 } else {
-                    (limit / 3.0 * (1.0 - left * left * left), left * left)
+                    // The formula multiplied out: no digits are lost for small residuals.
+                    let ratio = squared / limit;
+                    (squared * (1.0 - ratio + ratio * ratio / 3.0), left * left)
                 }
             }
             Self::GemanMcClure(scale) => {

@@ -152,7 +152,12 @@ pub fn minimise_watched(
         return Err(Error::Start { found: cost });
     }
     let mut minimum = Minimum { initial_cost: cost, final_cost: cost, ..Minimum::default() };
-    minimum.steps.push(Step { cost, gradient_max: equations.gradient_max(), accepted: true, ..Step::default() });
+    minimum.steps.push(Step {
+        cost,
+        gradient_max: equations.gradient_max(),
+        accepted: true,
+        ..Step::default()
+    });
     if equations.unknowns() == 0 {
         minimum.ending = Ending::Zero;
         return Ok(minimum);
@@ -237,7 +242,11 @@ impl SolverOptions {
             }
         }
         if !(self.damping > 0.0 && self.damping.is_finite()) {
-            return Err(Error::Option { option: "damping", expected: "a number over zero", found: self.damping });
+            return Err(Error::Option {
+                option: "damping",
+                expected: "a number over zero",
+                found: self.damping,
+            });
         }
         Ok(())
     }
@@ -352,7 +361,8 @@ impl Region {
             }
         }
         equations.solve(&self.right, &mut self.newton);
-        for ((descent, right), diagonal) in self.descent.iter_mut().zip(&self.right).zip(equations.diagonal()) {
+        for ((descent, right), diagonal) in self.descent.iter_mut().zip(&self.right).zip(equations.diagonal())
+        {
             *descent = right / diagonal;
         }
         let slope: f64 = self.descent.iter().zip(&self.right).map(|(d, r)| d * r).sum();

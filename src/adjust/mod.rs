@@ -9,6 +9,7 @@ mod error;
 mod estimation;
 mod factor;
 mod grouping;
+mod inverse_depth;
 mod line_factor;
 mod line_form;
 mod line_sight;
@@ -17,8 +18,10 @@ mod minimise;
 mod normal_equations;
 mod observations;
 mod options;
+mod parallax_point;
 mod parametrisation;
 mod point_factor;
+mod point_handle;
 mod point_sight;
 mod pose_factor;
 mod problem;
@@ -40,3 +43,8 @@ pub use parametrisation::{
 };
 pub use problem::{Problem, Values, Variable};
 pub use summary::{Reason, ReleasedLine, Summary, Tally};
+
+#[cfg(test)]
+mod scene;
+#[cfg(test)]
+mod tests;

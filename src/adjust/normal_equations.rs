@@ -170,7 +170,8 @@ impl NormalEquations {
         let first_number = |at: usize| structure.edge_start[structure.edges.start[at]];
         let first_block = block_start[reduced];
         let solved_ties = split(&mut self.solved_ties, bounds.iter().map(|at| first_number(*at)));
-        let inverses = split(&mut self.inverses, bounds.iter().map(|at| block_start[reduced + at] - first_block));
+        let inverses =
+            split(&mut self.inverses, bounds.iter().map(|at| block_start[reduced + at] - first_block));
         let (blocks, ties, diagonal) = (&self.blocks, &self.ties, &self.diagonal);
         solved_ties
             .into_par_iter()
@@ -184,7 +185,8 @@ impl NormalEquations {
                     let size = structure.eliminated_sizes[at];
                     let steps = step_start[variable]..step_start[variable + 1];
                     let block = &blocks[block_start[variable]..block_start[variable + 1]];
-                    let inverse = &mut inverses[block_start[variable] - block_start[reduced + first]..][..size * size];
+                    let inverse =
+                        &mut inverses[block_start[variable] - block_start[reduced + first]..][..size * size];
                     let diagonal = &diagonal[steps];
                     let positive = match size {
                         6 => invert::<6>(block, diagonal, damping, inverse),
@@ -257,10 +259,18 @@ impl NormalEquations {
                     let tie = &ties[structure.edge_start[other]..structure.edge_start[other + 1]];
                     let rows = structure.reduced_sizes[row];
                     match (inner, rows, size) {
-                        (3, 6, 6) => subtract::<3, 6, 6>(tie, solved, values, row == column, |c| places.at(row, c)),
-                        (6, 3, 3) => subtract::<6, 3, 3>(tie, solved, values, row == column, |c| places.at(row, c)),
-                        (2, 6, 6) => subtract::<2, 6, 6>(tie, solved, values, row == column, |c| places.at(row, c)),
-                        (4, 6, 6) => subtract::<4, 6, 6>(tie, solved, values, row == column, |c| places.at(row, c)),
+                        (3, 6, 6) => {
+                            subtract::<3, 6, 6>(tie, solved, values, row == column, |c| places.at(row, c))
+                        }
+                        (6, 3, 3) => {
+                            subtract::<6, 3, 3>(tie, solved, values, row == column, |c| places.at(row, c))
+                        }
+                        (2, 6, 6) => {
+                            subtract::<2, 6, 6>(tie, solved, values, row == column, |c| places.at(row, c))
+                        }
+                        (4, 6, 6) => {
+                            subtract::<4, 6, 6>(tie, solved, values, row == column, |c| places.at(row, c))
+                        }
                         _ => {
                             let shape = [inner, rows, size];
                             subtract_any(shape, tie, solved, values, row == column, |c| places.at(row, c));
@@ -320,7 +330,9 @@ impl NormalEquations {
                 let begin = self.step_start[reduced + at] - rows;
                 let tie = &self.ties[structure.edge_start[edge]..structure.edge_start[edge + 1]];
                 let size = target.len();
-                for (k, solved) in eliminated_step[begin..begin + structure.eliminated_sizes[at]].iter().enumerate() {
+                for (k, solved) in
+                    eliminated_step[begin..begin + structure.eliminated_sizes[at]].iter().enumerate()
+                {
                     for (target, entry) in target.iter_mut().zip(&tie[k * size..(k + 1) * size]) {
                         *target -= entry * solved;
                     }

@@ -108,7 +108,8 @@ impl Parametrisation for PoseSpace {
     }
     fn plus(&self, numbers: &[f64], step: &[f64], moved: &mut [f64]) {
         let pose = Pose::exp(&Vector6::from_column_slice(step)) * Self::pose_of(numbers);
-        let again = Pose::new(UnitQuaternion::new_normalize(pose.rotation().into_inner()), pose.translation());
+        let again =
+            Pose::new(UnitQuaternion::new_normalize(pose.rotation().into_inner()), pose.translation());
         moved.copy_from_slice(&Self::numbers_of(&again));
     }
 }

@@ -84,9 +84,8 @@ impl Problem {
         debug_assert_eq!(space.numbers(), numbers.len());
         debug_assert!(space.freedom() <= MOST_FREEDOM);
         // Compared by address of the shared space; spaces without fields are one kind wherever they lie.
-        let known = self.spaces.iter().position(|known| {
-            std::ptr::addr_eq(Arc::as_ptr(known), Arc::as_ptr(space))
-        });
+        let known =
+            self.spaces.iter().position(|known| std::ptr::addr_eq(Arc::as_ptr(known), Arc::as_ptr(space)));
         let kind = known.unwrap_or_else(|| {
             self.spaces.push(Arc::<P>::clone(space));
             self.spaces.len() - 1
@@ -144,7 +143,9 @@ impl Problem {
             match &shape {
                 None => shape = Some(found),
                 Some(shape) if *shape == found => {}
-                Some(_) => return Err(wrong(factor, "variables of the same spaces in all factors of a kind")),
+                Some(_) => {
+                    return Err(wrong(factor, "variables of the same spaces in all factors of a kind"));
+                }
             }
         }
         let columns: usize = shape.unwrap_or_default().iter().sum();
@@ -194,7 +195,12 @@ impl Problem {
     }
 
     /// Evaluates every factor at some numbers; gives the cost.
-    pub(super) fn evaluate(&self, numbers: &[f64], residuals: &mut [f64], jacobians: Option<&mut [f64]>) -> f64 {
+    pub(super) fn evaluate(
+        &self,
+        numbers: &[f64],
+        residuals: &mut [f64],
+        jacobians: Option<&mut [f64]>,
+    ) -> f64 {
         let values = Values { numbers, start: &self.start };
         let mut cost = 0.0;
         let (mut residuals, mut jacobians) = (residuals, jacobians);
@@ -214,7 +220,12 @@ impl Problem {
                         .zip(mine.par_chunks_mut(CHUNK * size))
                         .enumerate()
                         .map(|(index, (residuals, jacobians))| {
-                            batch.evaluate(of_chunk(index), &values, residuals, Some((jacobians, layout.columns)))
+                            batch.evaluate(
+                                of_chunk(index),
+                                &values,
+                                residuals,
+                                Some((jacobians, layout.columns)),
+                            )
                         })
                         .collect()
                 }

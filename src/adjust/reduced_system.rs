@@ -52,9 +52,15 @@ impl ReducedSystem {
             if rows > MOST_DENSE {
                 return Err(Error::TooLarge { most: MOST_DENSE, found: rows });
             }
-            let request = llt::factor::cholesky_in_place_scratch::<f64>(rows, Par::Seq, faer::Spec::default());
+            let request =
+                llt::factor::cholesky_in_place_scratch::<f64>(rows, Par::Seq, faer::Spec::default());
             let memory = MemBuffer::try_new(request).map_err(|_| too_large(rows))?;
-            return Ok(Self { start, pattern, values: vec![0.0; rows * rows], storage: Storage::Dense { memory } });
+            return Ok(Self {
+                start,
+                pattern,
+                values: vec![0.0; rows * rows],
+                storage: Storage::Dense { memory },
+            });
         }
         let (mut starts, mut indices) = (vec![0_u32], Vec::new());
         for block in 0..pattern.len() {
@@ -62,7 +68,8 @@ impl ReducedSystem {
                 indices.extend((column..start[block + 1]).filter_map(|row| u32::try_from(row).ok()));
                 for below in pattern.below(block) {
                     let below = *below as usize;
-                    indices.extend((start[below]..start[below + 1]).filter_map(|row| u32::try_from(row).ok()));
+                    indices
+                        .extend((start[below]..start[below + 1]).filter_map(|row| u32::try_from(row).ok()));
                 }
                 starts.push(u32::try_from(indices.len()).map_err(|_| too_large(rows))?);
             }
@@ -145,7 +152,8 @@ impl ReducedSystem {
                 let matrix = MatMut::from_column_major_slice_mut(&mut self.values, rows, rows);
                 let stack = MemStack::new(memory);
                 let regularisation = LltRegularization::default();
-                llt::factor::cholesky_in_place(matrix, regularisation, Par::Seq, stack, faer::Spec::default()).is_ok()
+                llt::factor::cholesky_in_place(matrix, regularisation, Par::Seq, stack, faer::Spec::default())
+                    .is_ok()
             }
             Storage::Sparse(sparse) => {
                 let Sparse { matrix, symbolic, factor, memory } = &mut **sparse;

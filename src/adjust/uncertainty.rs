@@ -45,10 +45,8 @@ impl Uncertainty {
     pub(super) fn times(&self, right: &DMatrix<f64>) -> DMatrix<f64> {
         let columns: Vec<Vec<f64>> =
             (0..right.ncols()).map(|k| right.column(k).iter().copied().collect()).collect();
-        let solved: Vec<Vec<f64>> = columns
-            .par_chunks(COLUMNS)
-            .flat_map_iter(|chunk| self.equations.solve_all(chunk))
-            .collect();
+        let solved: Vec<Vec<f64>> =
+            columns.par_chunks(COLUMNS).flat_map_iter(|chunk| self.equations.solve_all(chunk)).collect();
         DMatrix::from_fn(right.nrows(), right.ncols(), |row, column| solved[column][row])
     }
 

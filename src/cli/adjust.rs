@@ -194,7 +194,9 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     let options = args.options();
     let name = options.estimate_name().to_owned();
     if !args.replace && Estimate::is_in(&sequence, &name) {
-        anyhow::bail!("there is an estimate `{name}` already; --replace takes its place, --name gives this one another");
+        anyhow::bail!(
+            "there is an estimate `{name}` already; --replace takes its place, --name gives this one another"
+        );
     }
     let graph = pick(args.graph.as_deref(), &sequence)?;
     if args.graph.is_none() {
@@ -236,7 +238,11 @@ fn pick(name: Option<&str>, sequence: &Sequence) -> anyhow::Result<FactorGraph> 
     FactorGraph::of(sequence, picked).context("the graph is empty")
 }
 
-fn adjust_on_threads(graph: &FactorGraph, options: &Options, threads: Option<usize>) -> anyhow::Result<Adjusted> {
+fn adjust_on_threads(
+    graph: &FactorGraph,
+    options: &Options,
+    threads: Option<usize>,
+) -> anyhow::Result<Adjusted> {
     let progress = Progress::new("adjusting", "steps");
     let most = options.solver.max_iterations as u64;
     let mut done = 0;
@@ -279,19 +285,18 @@ fn as_text(graph: &str, name: &str, summary: &Summary) -> String {
     for (what, tally) in tallies(summary) {
         if tally.used > 0 || !tally.excluded.is_empty() {
             let excluded = tally.excluded.iter();
-            let excluded: Vec<String> =
-                excluded.map(|(reason, count)| format!("{} left out: {}", text::count(*count as u64), reason.words())).collect();
+            let excluded: Vec<String> = excluded
+                .map(|(reason, count)| format!("{} left out: {}", text::count(*count as u64), reason.words()))
+                .collect();
             let excluded =
                 if excluded.is_empty() { String::new() } else { format!("; {}", excluded.join("; ")) };
             lines.push(format!("  {what:<10} {} used{excluded}", text::count(tally.used as u64)));
         }
     }
     let ids = |frames: &[FrameId]| names(&frames.iter().map(|frame| frame.0).collect::<Vec<_>>());
-    for (what, frames) in [
-        ("held", &summary.held),
-        ("open", &summary.weak),
-        ("unmeasured", &summary.unconstrained),
-    ] {
+    for (what, frames) in
+        [("held", &summary.held), ("open", &summary.weak), ("unmeasured", &summary.unconstrained)]
+    {
         if !frames.is_empty() {
             lines.push(format!("  {what:<10} {} poses: frames {}", frames.len(), ids(frames)));
         }

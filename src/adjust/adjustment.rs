@@ -6,6 +6,7 @@ use super::grouping::Grouping;
 use super::minimise::{Step, minimise_watched};
 use super::observations::Observations;
 use super::options::{Method, Options, Parallelism};
+use super::scale_gauge::ScaleGauge;
 use super::summary::{Reason, Summary};
 use crate::structure::{Estimate, FactorGraph};
 
@@ -34,7 +35,8 @@ const MOST_ROUNDS: usize = 3;
 /// covariances are asked for and something is left open.
 ///
 /// # Source
-/// Open-Structure (Li et al. 2024), section IV. Where this differs: the paper says nothing on losses, weights and stopping.
+/// Open-Structure (Li et al. 2024), section IV. Where this differs: the paper says nothing on losses, weights and stopping. Pixels alone leave the scale open; here it
+/// ends where the cameras' initial centres have it, which changes no residual.
 pub fn adjust(graph: &FactorGraph, options: &Options) -> Result<Adjusted, Error> {
     adjust_watched(graph, options, &mut |_| true)
 }
@@ -57,6 +59,7 @@ pub fn adjust_watched(
             return Err(Error::UnknownFrame { graph: graph.name.clone(), frame: *frame });
         }
     }
+    let gauge = ScaleGauge::of(&observations);
     let mut grouping = Grouping::none(&observations);
     let mut estimation = Estimation::new(&observations, &grouping, options, &mut summary)?;
     let is_structural = options.method == Method::Structural;
@@ -87,6 +90,11 @@ pub fn adjust_watched(
     }
     if is_structural {
         recover_ends(&mut observations);
+    }
+    // A prior of a pose is a scale too.
+    let free = estimation.free_scales(&observations);
+    if options.priors.is_empty() && gauge.restore(&mut observations, &free) {
+        estimation = Estimation::new(&observations, &grouping, options, &mut summary)?;
     }
     summary.iterations = steps.len().saturating_sub(1);
     let estimate = estimation.estimate(&observations, options, &steps, &mut summary)?;

@@ -14,6 +14,7 @@ use super::point_handle::PointHandle;
 use super::pose_factor::{PosePriorFactor, RelativePoseFactor, ScaleFactor};
 use super::problem::{Problem, Variable};
 use super::shared_line::{ParallelFactor, RightAngleFactor, SharedLineFactor, shared_plucker};
+use super::scale_gauge::ONE_PLACE_M;
 use super::summary::Summary;
 use super::whitening::{ends_depth_sight, ends_sight};
 use crate::geometry::{PluckerLine, Segment};
@@ -252,41 +253,46 @@ impl Estimation {
         self.problem.add_factors(weak, Loss::None)
     }
 
+    /// The held frame of every part of the graph in which pixels alone leave the scale open, by the first frame of the part.
+    pub(super) fn free_scales(&self, observations: &Observations) -> Vec<Option<usize>> {
+        let components = observations.components();
+        let mut has_scale = vec![false; components.len()];
+        for view in &observations.point_views {
+            has_scale[components[view.frame]] |= view.depth.is_some();
+        }
+        for view in &observations.line_views {
+            has_scale[components[view.frame]] |= view.depths.iter().any(Option::is_some);
+        }
+        observations.relatives.iter().for_each(|view| has_scale[components[view.frame]] = true);
+        let mut held: Vec<Option<usize>> = vec![None; components.len()];
+        for frame in (0..components.len()).filter(|frame| self.problem.is_held(self.poses[*frame])) {
+            let (part, centre) = (components[frame], observations.centre(frame));
+            match held[part] {
+                None => held[part] = Some(frame),
+                // Two places that are held say how far they are apart.
+                Some(first) => {
+                    has_scale[part] |= (observations.centre(first) - centre).norm() > ONE_PLACE_M;
+                }
+            }
+        }
+        held.into_iter().zip(has_scale).map(|(held, known)| held.filter(|_| !known)).collect()
+    }
+
     /// Fixes the scale of every part of the graph in which pixels alone leave it open; whether there was any.
     ///
     /// By the distance of the centre that lies farthest from a held one. Uncertainties are then those at this scale.
     pub(super) fn hold_scale(&mut self, observations: &Observations) -> Result<bool, Error> {
         let components = observations.components();
-        let centres: Vec<Vector3<f64>> =
-            observations.frames.iter().map(|frame| frame.camera_from_world.inverse().translation()).collect();
-        let mut has_depth = vec![false; components.len()];
-        for view in &observations.point_views {
-            has_depth[components[view.frame]] |= view.depth.is_some();
-        }
-        for view in &observations.line_views {
-            has_depth[components[view.frame]] |= view.depths.iter().any(Option::is_some);
-        }
-        observations.relatives.iter().for_each(|view| has_depth[components[view.frame]] = true);
         let mut factors = Vec::new();
-        for part in 0..components.len() {
-            let frames: Vec<usize> =
-                (0..components.len()).filter(|frame| components[*frame] == part).collect();
-            let mut held = frames.iter().filter(|frame| self.problem.is_held(self.poses[**frame]));
-            let Some(first) = held.next() else { continue };
-            let has_two = held.any(|frame| (centres[*frame] - centres[*first]).norm() > 1e-9);
-            if has_depth[part] || has_two {
-                continue;
-            }
-            let distance = |frame: &usize| (centres[*frame] - centres[*first]).norm();
-            let farthest = frames.iter().max_by(|a, b| distance(a).total_cmp(&distance(b)));
-            if let Some(farthest) = farthest.filter(|frame| distance(frame) > 1e-9) {
-                let distance_m = distance(farthest);
-                factors.push(ScaleFactor {
-                    variables: [self.poses[*farthest]],
-                    from: centres[*first],
-                    distance_m,
-                    sigma_m: 1e-3 * distance_m,
-                });
+        for (part, held) in self.free_scales(observations).into_iter().enumerate() {
+            let Some(from) = held.map(|held| observations.centre(held)) else { continue };
+            let distance = |frame: &usize| (observations.centre(*frame) - from).norm();
+            let frames = (0..components.len()).filter(|frame| components[*frame] == part);
+            let farthest = frames.max_by(|a, b| distance(a).total_cmp(&distance(b)));
+            if let Some(farthest) = farthest.filter(|frame| distance(frame) > ONE_PLACE_M) {
+                let distance_m = distance(&farthest);
+                let variables = [self.poses[farthest]];
+                factors.push(ScaleFactor { variables, from, distance_m, sigma_m: 1e-3 * distance_m });
             }
         }
         let open = !factors.is_empty();

@@ -26,6 +26,7 @@ mod point_sight;
 mod pose_factor;
 mod problem;
 mod reduced_system;
+mod scale_gauge;
 mod shared_line;
 mod summary;
 mod uncertainty;

@@ -7,7 +7,7 @@ use crate::geometry::{PinholeCamera, PluckerLine, Pose, Segment, line_residual};
 use crate::structure::{
     DepthNoise, FactorGraph, FrameId, GraphFactor, LineId, MeasurementNoise, PointId, registry,
 };
-use nalgebra::{DMatrix, Point2, Point3, Vector2};
+use nalgebra::{DMatrix, Point2, Point3, Vector2, Vector3};
 use std::collections::BTreeMap;
 
 /// A pose of the graph.
@@ -305,6 +305,11 @@ impl Observations {
         summary.point_factors.used = self.point_views.len();
         summary.line_factors.used = self.line_views.len();
         summary.relative_factors.used = self.relatives.len();
+    }
+
+    /// Where a camera is, metres.
+    pub(super) fn centre(&self, frame: usize) -> Vector3<f64> {
+        self.frames[frame].camera_from_world.inverse().translation()
     }
 
     /// The part of the graph to which each frame belongs, by its first frame.

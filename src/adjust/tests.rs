@@ -330,3 +330,44 @@ fn a_line_off_its_group_is_released_and_the_others_stay() {
     assert_eq!(summary.released.iter().map(|line| line.line_id.0).collect::<Vec<_>>(), [1]);
     assert_eq!(summary.grouped, 11);
 }
+
+#[test]
+fn pixels_alone_end_at_the_scale_at_which_they_began() {
+    let scene = Scene { off: 0.03, sigma_px: 0.5, ..Scene::default() };
+    let graph = scene.graph();
+    let centres = |rows: &mut dyn Iterator<Item = crate::structure::PoseRow>| -> Vec<_> {
+        rows.map(|row| row.pose().unwrap().translation()).collect()
+    };
+    let began = centres(&mut graph.poses.iter().map(|row| row.world_from_camera()));
+    for method in [Method::Point, Method::PointLine] {
+        let adjusted = adjust(&graph, &options(method)).unwrap();
+        let found = centres(&mut adjusted.estimate.trajectory.iter().map(|row| row.world_from_camera()));
+        let (mut along, mut square) = (0.0, 0.0);
+        for (now, then) in found.iter().zip(&began) {
+            along += (now - found[0]).dot(&(then - began[0]));
+            square += (now - found[0]).norm_squared();
+        }
+        assert!((along / square - 1.0).abs() < 1e-12, "{method:?}: {}", along / square);
+        // Poses, points and lines were scaled alike, so no residual changed: adjusted again, there is nothing to gain.
+        let mut again = graph.clone();
+        for (row, pose) in again.poses.iter_mut().zip(&adjusted.estimate.trajectory) {
+            *row = crate::structure::GraphPose::new(
+                row.graph.clone(),
+                row.frame_id,
+                row.fixed,
+                pose.world_from_camera(),
+            );
+        }
+        for (row, point) in again.points.iter_mut().zip(&adjusted.estimate.points) {
+            (row.x, row.y, row.z) = (point.x, point.y, point.z);
+        }
+        for (row, line) in again.lines.iter_mut().zip(&adjusted.estimate.lines) {
+            (row.start_x, row.start_y, row.start_z) = (line.start_x, line.start_y, line.start_z);
+            (row.end_x, row.end_y, row.end_z) = (line.end_x, line.end_y, line.end_z);
+        }
+        let cost = adjusted.summary.final_cost;
+        let again = adjust(&again, &options(method)).unwrap().summary;
+        // Relative: rounding of poses and segments as they are stored.
+        assert!((again.initial_cost - cost).abs() < 1e-9 * cost, "{method:?}: {} {cost}", again.initial_cost);
+    }
+}

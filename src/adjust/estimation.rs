@@ -69,7 +69,7 @@ impl Estimation {
         estimation.add_points(observations, options)?;
         match options.lines {
             LineKind::Orthonormal => {
-                estimation.add_lines(&Arc::new(LineSpace), observations, grouping, options)?
+                estimation.add_lines(&Arc::new(LineSpace), observations, grouping, options)?;
             }
             LineKind::Endpoints => {
                 estimation.add_lines(&Arc::new(EndpointsSpace), observations, grouping, options)?;
@@ -268,13 +268,13 @@ impl Estimation {
         }
         observations.relatives.iter().for_each(|view| has_depth[components[view.frame]] = true);
         let mut factors = Vec::new();
-        for part in 0..components.len() {
+        for (part, has_depth) in has_depth.into_iter().enumerate() {
             let frames: Vec<usize> =
                 (0..components.len()).filter(|frame| components[*frame] == part).collect();
             let mut held = frames.iter().filter(|frame| self.problem.is_held(self.poses[**frame]));
             let Some(first) = held.next() else { continue };
             let has_two = held.any(|frame| (centres[*frame] - centres[*first]).norm() > 1e-9);
-            if has_depth[part] || has_two {
+            if has_depth || has_two {
                 continue;
             }
             let distance = |frame: &usize| (centres[*frame] - centres[*first]).norm();

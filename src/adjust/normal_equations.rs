@@ -260,16 +260,16 @@ impl NormalEquations {
                     let rows = structure.reduced_sizes[row];
                     match (inner, rows, size) {
                         (3, 6, 6) => {
-                            subtract::<3, 6, 6>(tie, solved, values, row == column, |c| places.at(row, c))
+                            subtract::<3, 6, 6>(tie, solved, values, row == column, |c| places.at(row, c));
                         }
                         (6, 3, 3) => {
-                            subtract::<6, 3, 3>(tie, solved, values, row == column, |c| places.at(row, c))
+                            subtract::<6, 3, 3>(tie, solved, values, row == column, |c| places.at(row, c));
                         }
                         (2, 6, 6) => {
-                            subtract::<2, 6, 6>(tie, solved, values, row == column, |c| places.at(row, c))
+                            subtract::<2, 6, 6>(tie, solved, values, row == column, |c| places.at(row, c));
                         }
                         (4, 6, 6) => {
-                            subtract::<4, 6, 6>(tie, solved, values, row == column, |c| places.at(row, c))
+                            subtract::<4, 6, 6>(tie, solved, values, row == column, |c| places.at(row, c));
                         }
                         _ => {
                             let shape = [inner, rows, size];

@@ -9,6 +9,7 @@ use crate::structure::{
 };
 use nalgebra::{DMatrix, Point2, Point3, Vector2, Vector3};
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 /// A pose of the graph.
 #[derive(Clone, Copy, Debug)]
@@ -164,11 +165,11 @@ impl Observations {
             let position = Point3::new(row.x, row.y, row.z);
             if !position.iter().all(|number| number.is_finite()) {
                 summary.points.exclude(Reason::NotFinite);
-            } else if points.contains_key(&row.point_id) {
-                summary.points.exclude(Reason::Duplicate);
-            } else {
-                points.insert(row.point_id, self.points.len());
+            } else if let Entry::Vacant(entry) = points.entry(row.point_id) {
+                entry.insert(self.points.len());
                 self.points.push(PointVertex { point_id: row.point_id, position });
+            } else {
+                summary.points.exclude(Reason::Duplicate);
             }
         }
         let mut rows: Vec<_> = graph.lines.iter().collect();
@@ -180,11 +181,11 @@ impl Observations {
                 summary.lines.exclude(if finite { Reason::NoLength } else { Reason::NotFinite });
                 continue;
             };
-            if lines.contains_key(&row.line_id) {
-                summary.lines.exclude(Reason::Duplicate);
-            } else {
-                lines.insert(row.line_id, self.lines.len());
+            if let Entry::Vacant(entry) = lines.entry(row.line_id) {
+                entry.insert(self.lines.len());
                 self.lines.push(LineVertex { line_id: row.line_id, segment, line });
+            } else {
+                summary.lines.exclude(Reason::Duplicate);
             }
         }
         (frames, points, lines)
@@ -248,7 +249,7 @@ impl Observations {
         let line = *lines.get(&line_id).ok_or(Reason::UnknownVertex)?;
         let camera = *cameras.get(&frame_id).ok_or(Reason::UnknownCamera)?;
         let pose = &self.frames[frame].camera_from_world;
-        let pixels = ends.map(|end| Point2::from(end));
+        let pixels = ends.map(Point2::from);
         if line_residual(&camera, pose, &self.lines[line].line, pixels).is_err() {
             return Err(Reason::NoImage);
         }
@@ -316,13 +317,6 @@ impl Observations {
     pub(super) fn components(&self) -> Vec<usize> {
         let (frames, points) = (self.frames.len(), self.points.len());
         let mut parent: Vec<usize> = (0..frames + points + self.lines.len()).collect();
-        fn root(parent: &mut [usize], mut at: usize) -> usize {
-            while parent[at] != at {
-                parent[at] = parent[parent[at]];
-                at = parent[at];
-            }
-            at
-        }
         let mut join = |a: usize, b: usize| {
             let (a, b) = (root(&mut parent, a), root(&mut parent, b));
             parent[a.max(b)] = a.min(b);
@@ -332,6 +326,15 @@ impl Observations {
         self.relatives.iter().for_each(|view| join(view.frame, view.other));
         (0..frames).map(|frame| root(&mut parent, frame)).collect()
     }
+}
+
+/// The first member of a set of joined places; shortens the way there.
+fn root(parent: &mut [usize], mut at: usize) -> usize {
+    while parent[at] != at {
+        parent[at] = parent[parent[at]];
+        at = parent[at];
+    }
+    at
 }
 
 /// The camera of every frame that has a usable one.

@@ -46,16 +46,15 @@ fn coordinates(view: &LineView, noise: &MeasurementNoise) -> Matrix4<f64> {
 
 /// What a frame measured of a line, without depths.
 pub(super) fn ends_sight(view: &LineView, noise: &MeasurementNoise) -> EndsSight {
-    let root = match &view.information {
-        None => Matrix2::from_diagonal_element(1.0 / noise.sigma_px),
-        Some(_) => {
-            let along = (view.ends[1] - view.ends[0]).normalize();
-            let (x, y) = (-along.y, along.x);
-            let across = Matrix2x4::new(x, y, 0.0, 0.0, 0.0, 0.0, x, y);
-            let covariance = across * coordinates(view, noise) * across.transpose();
-            let information = covariance.try_inverse().and_then(nalgebra::linalg::Cholesky::new);
-            information.map_or_else(Matrix2::zeros, |factor| factor.l().transpose())
-        }
+    let root = if view.information.is_none() {
+        Matrix2::from_diagonal_element(1.0 / noise.sigma_px)
+    } else {
+        let along = (view.ends[1] - view.ends[0]).normalize();
+        let (x, y) = (-along.y, along.x);
+        let across = Matrix2x4::new(x, y, 0.0, 0.0, 0.0, 0.0, x, y);
+        let covariance = across * coordinates(view, noise) * across.transpose();
+        let information = covariance.try_inverse().and_then(nalgebra::linalg::Cholesky::new);
+        information.map_or_else(Matrix2::zeros, |factor| factor.l().transpose())
     };
     EndsSight { camera: view.camera, ends: view.ends, root }
 }

@@ -16,7 +16,7 @@ use super::problem::{Problem, Variable};
 use super::shared_line::{ParallelFactor, RightAngleFactor, SharedLineFactor, shared_plucker};
 use super::scale_gauge::ONE_PLACE_M;
 use super::summary::Summary;
-use super::whitening::{ends_depth_sight, ends_sight};
+use super::whitening::{ends_depth_sight, ends_sight, root};
 use crate::geometry::{PluckerLine, Segment};
 use crate::structure::{Estimate, Iteration, MapLine, MapPoint, PoseRow, TrajectoryPose};
 use nalgebra::{Matrix3x4, Matrix6, Point2, Point3, SMatrix, Vector3, Vector6};
@@ -170,8 +170,8 @@ impl Estimation {
     fn add_relatives(&mut self, observations: &Observations, options: &Options) -> Result<(), Error> {
         let factors = observations.relatives.iter().map(|view| {
             let root = view.information.as_ref().map_or_else(Matrix6::identity, |information| {
-                let information: Matrix6<f64> = information.fixed_view::<6, 6>(0, 0).into_owned();
-                information.cholesky().map_or_else(Matrix6::zeros, |factor| factor.l().transpose())
+                let root = root(information);
+                root.map_or_else(Matrix6::zeros, |root| root.fixed_view::<6, 6>(0, 0).into_owned())
             });
             RelativePoseFactor {
                 variables: [self.poses[view.frame], self.poses[view.other]],

@@ -2,6 +2,7 @@
 
 use super::error::Error;
 use super::options::{Method, Options};
+use super::whitening::root as information_root;
 use super::summary::{Reason, Summary, Tally};
 use crate::geometry::{PinholeCamera, PluckerLine, Pose, Segment, line_residual};
 use crate::structure::{
@@ -403,11 +404,17 @@ fn information(factor: &GraphFactor, size: usize, used: usize) -> Result<Option<
             matrix[(column, row)] = number;
         }
     }
-    if used == size {
-        return matrix.clone().cholesky().map(|_| Some(matrix)).ok_or(Reason::BadInformation);
+    // Lines are weighed by their covariance, which has to be there; the others may leave something open.
+    let is_line = factor.line_id.is_some();
+    let usable = |matrix: &DMatrix<f64>| {
+        if is_line { matrix.clone().cholesky().is_some() } else { information_root(matrix).is_some() }
+    };
+    if used < size {
+        // Marginal: what is left when the others are minimised over.
+        let rest = matrix.view((used, used), (size - used, size - used)).into_owned();
+        let cross = matrix.view((0, used), (used, size - used)).into_owned();
+        let inverse = rest.pseudo_inverse(f64::MIN_POSITIVE).map_err(|_| Reason::BadInformation)?;
+        matrix = matrix.view((0, 0), (used, used)) - &cross * inverse * cross.transpose();
     }
-    // Marginal: the inverse of the covariance's part.
-    let covariance = matrix.cholesky().ok_or(Reason::BadInformation)?.inverse();
-    let part = covariance.view((0, 0), (used, used)).into_owned();
-    part.cholesky().map(|factor| Some(factor.inverse())).ok_or(Reason::BadInformation)
+    if usable(&matrix) { Ok(Some(matrix)) } else { Err(Reason::BadInformation) }
 }

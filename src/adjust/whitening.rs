@@ -5,14 +5,38 @@ use super::observations::{LineView, PointView};
 use super::point_sight::{DepthSight, DepthWeight, PixelSight};
 use crate::geometry::{PinholeCamera, PluckerLine, Pose};
 use crate::structure::MeasurementNoise;
+use nalgebra::linalg::SymmetricEigen;
 use nalgebra::{DMatrix, Matrix2, Matrix2x4, Matrix3, Matrix4, Vector2};
+
+/// Eigenvalues below this part of the largest are zero by rounding.
+const ROUNDING: f64 = 1e-12;
+
+/// `W` with `WᵀW` an information matrix: from Cholesky, or from eigenvectors where something is left open (semi-definite).
+///
+/// `None` for a matrix with a negative eigenvalue, or one that is not finite.
+pub(super) fn root(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    if let Some(factor) = information.clone().cholesky() {
+        return Some(factor.l().transpose());
+    }
+    if !information.iter().all(|number| number.is_finite()) {
+        return None;
+    }
+    let eigen = SymmetricEigen::new(information.clone());
+    let largest = eigen.eigenvalues.amax();
+    if eigen.eigenvalues.iter().any(|value| *value < -ROUNDING.sqrt() * largest) {
+        return None;
+    }
+    let scale = |value: f64| if value > ROUNDING * largest { value.sqrt() } else { 0.0 };
+    let scales = eigen.eigenvalues.map(scale);
+    Some(DMatrix::from_diagonal(&scales) * eigen.eigenvectors.transpose())
+}
 
 /// What a frame measured of a point, without its depth.
 pub(super) fn pixel_sight(view: &PointView, noise: &MeasurementNoise) -> PixelSight {
     let root = match &view.information {
         Some(information) => {
-            let part: Matrix2<f64> = information.fixed_view::<2, 2>(0, 0).into_owned();
-            part.cholesky().map_or_else(Matrix2::zeros, |factor| factor.l().transpose())
+            let part = information.view((0, 0), (2, 2)).into_owned();
+            root(&part).map_or_else(Matrix2::zeros, |root| root.fixed_view::<2, 2>(0, 0).into_owned())
         }
         None => Matrix2::from_diagonal_element(1.0 / noise.sigma_px),
     };
@@ -23,8 +47,8 @@ pub(super) fn pixel_sight(view: &PointView, noise: &MeasurementNoise) -> PixelSi
 pub(super) fn depth_sight(view: &PointView, depth_m: f64, noise: &MeasurementNoise) -> DepthSight {
     let weight = match &view.information {
         Some(information) => {
-            let all: Matrix3<f64> = information.fixed_view::<3, 3>(0, 0).into_owned();
-            let root = all.cholesky().map_or_else(Matrix3::zeros, |factor| factor.l().transpose());
+            let root = root(information);
+            let root = root.map_or_else(Matrix3::zeros, |root| root.fixed_view::<3, 3>(0, 0).into_owned());
             DepthWeight::Root(root)
         }
         None => DepthWeight::Noise(*noise),
@@ -107,4 +131,24 @@ fn depth_sigma(information: &DMatrix<f64>, end: usize) -> f64 {
     covariance
         .filter(|covariance| covariance.nrows() == 6)
         .map_or(f64::INFINITY, |covariance| covariance[(place, place)].max(0.0).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_root_times_itself_is_the_information_also_where_something_is_open() {
+        let rows = [[4.0, 1.0, 0.0], [1.0, 9.0, -2.0], [0.0, -2.0, 1.0]];
+        let whole = DMatrix::from_fn(3, 3, |row, column| rows[row][column]);
+        let flat = DMatrix::from_diagonal(&nalgebra::DVector::from_vec(vec![0.0, 4.0, 0.0]));
+        let across = nalgebra::DVector::from_vec(vec![1.0, -2.0, 0.5]);
+        for information in [whole, flat, &across * across.transpose(), DMatrix::zeros(3, 3)] {
+            let root = root(&information).unwrap();
+            assert!((root.transpose() * &root - &information).amax() < 1e-14, "{information}");
+        }
+        let negative = DMatrix::from_row_slice(2, 2, &[1.0, 2.0, 2.0, 1.0]);
+        assert_eq!(root(&negative), None);
+        assert_eq!(root(&(negative * f64::NAN)), None);
+    }
 }

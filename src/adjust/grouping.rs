@@ -5,11 +5,19 @@ use super::observations::Observations;
 use super::summary::{ReleasedLine, Summary};
 use super::uncertainty::Uncertainty;
 use crate::structure::{FactorGraph, GroupId, LineId};
-use nalgebra::{DMatrix, DVector, Matrix2, Vector2, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Matrix3x2, Vector2, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Squared length, in sigma, of a difference in two degrees of freedom that chance exceeds once in a thousand times.
 const CONTRADICTION: f64 = 13.8155;
+
+/// How far the misfit of a whole group may lie above its mean, in its standard deviations: chance goes farther once in some hundred times.
+///
+/// Lines that are each a little off stay under [`CONTRADICTION`] one by one, and bend everything together.
+const WHOLE_SIGMA: f64 = 2.5;
+
+/// Squared difference from a right angle, in sigma, that chance exceeds once in a thousand times.
+const NOT_UPRIGHT: f64 = 10.8276;
 
 /// Directions are taken to be no better known than this, radians: what is left of rounding and of linearisation.
 const LEAST_SIGMA_RAD: f64 = 1e-4;
@@ -41,8 +49,10 @@ impl Grouping {
     ///
     /// With the directions `y` of a group's lines and their joint covariance `C`, the group is held against the hypothesis of one
     /// direction by generalised least squares. While there is a line whose deletion lowers the squared misfit by more than chance would
-    /// (two degrees of freedom, one in a thousand), the worst is released. So lines count by how well they are known, and a common
-    /// drift, which the covariance holds, releases none.
+    /// (two degrees of freedom, one in a thousand), or the misfit of the whole group is more than chance, the worst line is released. So
+    /// lines count by how well they are known, and a common drift, which the covariance holds, releases none.
+    ///
+    /// Right angles that are declared are held against the angle between directions and its variance in the same way.
     pub(super) fn tested(
         graph: &FactorGraph,
         observations: &Observations,
@@ -54,7 +64,7 @@ impl Grouping {
             observations.lines.iter().enumerate().map(|(at, line)| (line.line_id, at)).collect();
         summary.released.clear();
         let Ok(uncertainty) = Uncertainty::of(&estimation.problem) else { return found };
-        let mut group_places = BTreeMap::new();
+        let (mut group_places, mut commons) = (BTreeMap::new(), Vec::new());
         let mut taken = BTreeSet::new();
         for group in graph.groups.iter().filter(|group| !group.is_made_of_groups()) {
             let ids: BTreeSet<LineId> = group.line_ids.iter().copied().collect();
@@ -64,7 +74,7 @@ impl Grouping {
                 .filter_map(|id| places.get(id).copied())
                 .filter(|line| taken.insert(*line))
                 .collect();
-            let (kept, direction, released) =
+            let (kept, common, released) =
                 agreeing(group.group_id, &lines, observations, estimation, &uncertainty);
             summary.released.extend(released);
             if kept.len() < 2 {
@@ -74,9 +84,10 @@ impl Grouping {
             for line in kept {
                 found.of_line[line] = Some(found.directions.len());
             }
-            found.directions.push(direction);
+            found.directions.push(common.direction);
+            commons.push(common);
         }
-        found.find_right_angles(graph, &group_places);
+        found.find_right_angles(graph, &group_places, |a, b| commons[a].is_upright(&commons[b]));
         summary.grouped = found.of_line.iter().flatten().count();
         found
     }
@@ -116,7 +127,9 @@ impl Grouping {
             }
             found.directions.push(common);
         }
-        found.find_right_angles(graph, &group_places);
+        let directions = found.directions.clone();
+        let is_upright = |a: usize, b: usize| directions[a].dot(&directions[b]).abs() < EXACT_RAD;
+        found.find_right_angles(graph, &group_places, is_upright);
         summary.grouped = found.of_line.iter().flatten().count();
         found
     }
@@ -126,6 +139,7 @@ impl Grouping {
         &mut self,
         graph: &FactorGraph,
         groups: &BTreeMap<GroupId, (usize, BTreeSet<LineId>)>,
+        is_upright: impl Fn(usize, usize) -> bool,
     ) {
         for whole in graph.groups.iter().filter(|group| group.is_made_of_groups()) {
             let ids: BTreeSet<LineId> = whole.line_ids.iter().copied().collect();
@@ -134,13 +148,31 @@ impl Grouping {
             for (at, a) in parts.iter().enumerate() {
                 for b in &parts[at + 1..] {
                     // In an `atlanta` group some pairs are perpendicular; which, their directions say.
-                    let off = libm::asin(self.directions[*a].dot(&self.directions[*b]).abs().min(1.0));
-                    if off < 0.02 && !self.right_angles.contains(&[*a, *b]) {
+                    if is_upright(*a, *b) && !self.right_angles.contains(&[*a, *b]) {
                         self.right_angles.push([*a, *b]);
                     }
                 }
             }
         }
+    }
+}
+
+/// The direction that lines have in common, length one, and its covariance.
+#[derive(Clone, Copy, Debug)]
+struct Common {
+    direction: Vector3<f64>,
+    covariance: Matrix3<f64>,
+}
+
+impl Common {
+    /// Whether two directions are at right angles as far as they are known.
+    fn is_upright(&self, other: &Self) -> bool {
+        let off = self.direction.dot(&other.direction);
+        let variance = other.direction.dot(&(self.covariance * other.direction))
+            + self.direction.dot(&(other.covariance * self.direction))
+            + LEAST_SIGMA_RAD * LEAST_SIGMA_RAD;
+        // Farther off, the variance of a tangent means nothing.
+        off.abs() < FARTHEST_RAD && off * off <= NOT_UPRIGHT * variance
     }
 }
 
@@ -151,10 +183,12 @@ fn agreeing(
     observations: &Observations,
     estimation: &Estimation,
     uncertainty: &Uncertainty,
-) -> (Vec<usize>, Vector3<f64>, Vec<ReleasedLine>) {
+) -> (Vec<usize>, Common, Vec<ReleasedLine>) {
     let direction = |line: usize| observations.lines[line].line.direction;
     let mut released = Vec::new();
-    let Some(reference) = consensus(lines, direction) else { return (Vec::new(), Vector3::x(), released) };
+    let Some(reference) = consensus(lines, direction) else {
+        return (Vec::new(), Common { direction: Vector3::x(), covariance: Matrix3::zeros() }, released);
+    };
     let axis = Vector3::ith_axis(reference.iamin()).into_inner();
     let first = (axis - reference * reference.dot(&axis)).normalize();
     let axes = [first, reference.cross(&first)];
@@ -175,7 +209,7 @@ fn agreeing(
     }
     let all = joint(&kept, &axes, &reference, estimation, uncertainty);
     let mut active: Vec<usize> = (0..kept.len()).collect();
-    let mut mean = Vector2::zeros();
+    let (mut mean, mut of_mean) = (Vector2::zeros(), Matrix2::zeros());
     while active.len() >= 2 {
         let size = 2 * active.len();
         let covariance = DMatrix::from_fn(size, size, |row, column| {
@@ -196,7 +230,7 @@ fn agreeing(
             break;
         };
         let estimate = total * (weighted.transpose() * &y).fixed_rows::<2>(0);
-        mean = Vector2::new(estimate[0], estimate[1]);
+        (mean, of_mean) = (Vector2::new(estimate[0], estimate[1]), total);
         let projector = &weights - &weighted * total * weighted.transpose();
         let misfit = &projector * &y;
         let worst = (0..active.len())
@@ -206,7 +240,11 @@ fn agreeing(
                 Some((at, r.dot(&(block.try_inverse()? * r))))
             })
             .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
-        let Some((at, chi_squared)) = worst.filter(|(_, chi)| *chi > CONTRADICTION) else { break };
+        let freedom = (2 * active.len() - 2) as f64;
+        let is_plausible = y.dot(&misfit) <= freedom + WHOLE_SIGMA * (2.0 * freedom).sqrt();
+        let Some((at, chi_squared)) = worst.filter(|(_, chi)| *chi > CONTRADICTION || !is_plausible) else {
+            break;
+        };
         let line = kept[active.remove(at)];
         let angle_rad = (off(line) - mean).norm();
         let line_id = observations.lines[line].line_id;
@@ -217,7 +255,9 @@ fn agreeing(
     }
     let direction = (reference + axes[0] * mean.x + axes[1] * mean.y).normalize();
     released.sort_by_key(|line| line.line_id);
-    (active.into_iter().map(|at| kept[at]).collect(), direction, released)
+    let across = Matrix3x2::from_columns(&axes);
+    let common = Common { direction, covariance: across * of_mean * across.transpose() };
+    (active.into_iter().map(|at| kept[at]).collect(), common, released)
 }
 
 /// The direction from which the directions of all lines are least far off in the median; the first of equals.

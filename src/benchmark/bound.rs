@@ -1,18 +1,18 @@
 //! The bound: how accurate any method could be on what was measured.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
-use nalgebra::{Point2, Point3, Vector3};
+use nalgebra::{Point2, Point3};
 use serde::{Deserialize, Serialize};
 
 use super::run::adjust_options;
-use super::{Error, Method, Plan, Store, measured};
+use super::{Error, Method, Plan, Progress, Store, measured};
 use crate::adjust;
 use crate::covisibility::{GraphOptions, reprojection_graph};
 use crate::geometry::{PinholeCamera, Pose, triangulate_point};
 use crate::structure::{
     Estimate, FactorGraph, FrameId, LineId, MapLine, MapPoint, MeasuredFrame, MeasurementNoise, PointId,
-    Sequence, StructuralGroup, TrajectoryPose, registry,
+    Sequence, TrajectoryPose, registry,
 };
 
 /// What the measurements allow.
@@ -27,7 +27,12 @@ pub struct Bound {
 }
 
 /// The bounds of a sequence, by method; trackers and `structural-ba` share theirs.
-pub(super) fn bounds(sequence: &Sequence, plan: &Plan, store: &Store) -> Result<(), Error> {
+pub(super) fn bounds(
+    sequence: &Sequence,
+    plan: &Plan,
+    store: &Store,
+    tell: &(dyn Fn(&Progress<'_>) + Sync),
+) -> Result<(), Error> {
     let title = &sequence.manifest.name;
     if store.bound(title)?.is_some() {
         return Ok(());
@@ -39,7 +44,13 @@ pub(super) fn bounds(sequence: &Sequence, plan: &Plan, store: &Store) -> Result<
     for method in &plan.methods {
         // Trackers may use all that the structural adjustment uses.
         let basis = if method.is_adjustment() { *method } else { Method::StructuralBa };
-        let bound = bounds.entry(basis).or_insert_with(|| bound_of(&sequence, basis).ok());
+        let bound = bounds.entry(basis).or_insert_with(|| match bound_of(&sequence, basis) {
+            Ok(bound) => Some(bound),
+            Err(reason) => {
+                tell(&Progress::NoBound { sequence: title, method: basis.name(), reason: &reason });
+                None
+            }
+        });
         found.extend(bound.map(|bound| (method.name().to_owned(), bound)));
     }
     store.keep_bound(title, &found)
@@ -121,49 +132,21 @@ fn triangulated(sequence: &Sequence, known: &BTreeMap<PointId, Point3<f64>>) -> 
     views.into_iter().filter_map(|(id, views)| Some((id, triangulate_point(&views)?.point))).collect()
 }
 
-/// Lines of one group whose directions differ by more are not parallel as they were measured, radians: the specification's tolerance.
-const PARALLEL_RAD: f64 = 1e-3;
-
-/// The groups as far as they hold for the lines that were measured; a group of groups is left out where one of its lines is.
-fn true_groups(sequence: &Sequence, truth: &Estimate) -> Vec<StructuralGroup> {
-    let directions: BTreeMap<LineId, Vector3<f64>> =
-        truth.lines.iter().filter_map(|row| Some((row.line_id, row.segment().direction()?))).collect();
-    let mut kept = Vec::new();
-    let mut released: BTreeSet<LineId> = BTreeSet::new();
-    for group in sequence.structural_groups.iter().filter(|group| group.kind == registry::PARALLEL) {
-        let Some(common) = group.direction() else { continue };
-        let holds = |line: &LineId| {
-            let sine = directions.get(line).map(|direction| direction.cross(&common).norm());
-            sine.is_some_and(|sine| sine <= PARALLEL_RAD)
-        };
-        let (line_ids, out): (Vec<LineId>, Vec<LineId>) = group.line_ids.iter().partition(|line| holds(line));
-        released.extend(out);
-        if line_ids.len() > 1 {
-            kept.push(StructuralGroup { line_ids, ..group.clone() });
-        }
-    }
-    let whole = |group: &&StructuralGroup| {
-        group.is_made_of_groups() && group.line_ids.iter().all(|line| !released.contains(line))
-    };
-    kept.extend(sequence.structural_groups.iter().filter(whole).cloned());
-    kept
-}
-
 /// The graph of what was measured, at the truth.
 fn graph(sequence: &Sequence) -> Result<FactorGraph, String> {
     let truth = truth(sequence);
-    let groups = true_groups(sequence, &truth);
+    let groups = &sequence.structural_groups;
     let noise = MeasurementNoise::declared(&sequence.manifest);
     let (frames, cameras) = (MeasuredFrame::of(sequence), &sequence.manifest.cameras);
-    reprojection_graph(&frames, &truth, cameras, noise, &groups, &GraphOptions::default())
+    reprojection_graph(&frames, &truth, cameras, noise, groups, &GraphOptions::default())
         .map(|(graph, _)| graph)
         .map_err(|cause| cause.to_string())
 }
 
 /// The bound of a method on the measurements of a sequence, at its true poses and landmarks.
 ///
-/// For a method whose scale is free, after Sim(3) alignment; for the others after SE(3) alignment. Groups of lines are taken as
-/// they are declared only where their lines are parallel as measured.
+/// For a method whose scale is free, after Sim(3) alignment; for the others after SE(3) alignment. Groups count as far as their lines
+/// are parallel as they were measured.
 ///
 /// * `sequence` — measurements as of [`measured`]; true poses and landmarks.
 ///

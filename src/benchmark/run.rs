@@ -24,6 +24,15 @@ pub enum Progress<'a> {
         /// Why.
         reason: &'a str,
     },
+    /// The bound of a method on a sequence cannot be computed.
+    NoBound {
+        /// Name of the sequence.
+        sequence: &'a str,
+        /// Name of the method.
+        method: &'a str,
+        /// Why.
+        reason: &'a str,
+    },
     /// So many of so many units, each one sequence with one seed, are done.
     Done {
         /// Units done.
@@ -96,7 +105,7 @@ pub fn run(
     units.par_iter().with_max_len(1).try_for_each(|(case, unit)| {
         match unit {
             Some(seed) => seeded(case, plan, *seed, store)?,
-            None => bounds(&case.sequence, plan, store)?,
+            None => bounds(&case.sequence, plan, store, tell)?,
         }
         let done = 1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
         tell(&Progress::Done { done, total });

@@ -121,6 +121,9 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     let progress = Progress::new("benchmarking", "units");
     let tell = |told: &benchmark::Progress<'_>| match told {
         benchmark::Progress::Done { done, total } => progress.update(*done, *total),
+        benchmark::Progress::NoBound { sequence, method, reason } => {
+            let _ = writeln!(io::stderr(), "warning: {sequence}: no bound for {method}: {reason}");
+        }
         benchmark::Progress::LeftOut { sequence, reason } => {
             left_out.store(true, std::sync::atomic::Ordering::Relaxed);
             let _ = writeln!(io::stderr(), "warning: {sequence}: left out: {reason}");

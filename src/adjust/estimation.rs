@@ -13,8 +13,8 @@ use super::parametrisation::{DirectionSpace, LineSpace, PoseSpace, VectorSpace};
 use super::point_handle::PointHandle;
 use super::pose_factor::{PosePriorFactor, RelativePoseFactor, ScaleFactor};
 use super::problem::{Problem, Variable};
-use super::shared_line::{ParallelFactor, RightAngleFactor, SharedLineFactor, shared_plucker};
 use super::scale_gauge::ONE_PLACE_M;
+use super::shared_line::{ParallelFactor, RightAngleFactor, SharedLineFactor, shared_plucker};
 use super::summary::Summary;
 use super::whitening::{ends_depth_sight, ends_sight, root};
 use crate::geometry::{PluckerLine, Segment};
@@ -23,14 +23,16 @@ use nalgebra::{Matrix3x4, Matrix6, Point2, Point3, SMatrix, Vector3, Vector6};
 use std::marker::PhantomData;
 use std::sync::Arc;
 
-/// A frame whose measurements leave its pose open gets this prior: radians and metres.
-const WEAK_PRIOR: [f64; 2] = [1.0, 100.0];
+/// A frame whose measurements leave its pose open, or just determine it, gets this prior about where it began: radians and metres.
+///
+/// Three points in pixels have four exact poses and no redundancy: noise moves such a frame by half a metre.
+const WEAK_PRIOR: [f64; 2] = [0.3, 1.0];
 
 /// How far from a right angle directions may be that are perpendicular, radians: as good as never.
 const RIGHT_ANGLE_RAD: f64 = 1e-5;
 
-/// Numbers of residual from which on a frame's pose is not open by their count.
-const ENOUGH_FOR_A_POSE: usize = 6;
+/// Numbers of residual that make a frame's pose redundant: four points in pixels, or three with depth.
+const ENOUGH_FOR_A_POSE: usize = 8;
 
 /// A problem, and which of its variables is what.
 pub(super) struct Estimation {
@@ -217,8 +219,8 @@ impl Estimation {
             numbers[view.frame] += 2 + view.depths.iter().flatten().count();
         });
         for view in &observations.relatives {
-            numbers[view.frame] += 6;
-            numbers[view.other] += 6;
+            numbers[view.frame] += ENOUGH_FOR_A_POSE;
+            numbers[view.other] += ENOUGH_FOR_A_POSE;
         }
         let components = observations.components();
         let has_prior = |frame: usize| {

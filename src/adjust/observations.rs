@@ -2,8 +2,8 @@
 
 use super::error::Error;
 use super::options::{Method, Options};
-use super::whitening::root as information_root;
 use super::summary::{Reason, Summary, Tally};
+use super::whitening::root as information_root;
 use crate::geometry::{PinholeCamera, PluckerLine, Pose, Segment, line_residual};
 use crate::structure::{
     DepthNoise, FactorGraph, FrameId, GraphFactor, LineId, MeasurementNoise, PointId, registry,

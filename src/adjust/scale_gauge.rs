@@ -51,7 +51,10 @@ impl ScaleGauge {
             None => *point,
         };
         // A landmark belongs to the part of the frames that see it.
-        for view in seen_first(observations.points.len(), observations.point_views.iter().map(|view| (view.point, view.frame))) {
+        for view in seen_first(
+            observations.points.len(),
+            observations.point_views.iter().map(|view| (view.point, view.frame)),
+        ) {
             let (point, frame) = view;
             observations.points[point].position =
                 moved(components[frame], &observations.points[point].position);

@@ -72,7 +72,8 @@ fn the_jacobian_is_the_difference() {
     let at = |numbers: &[f64], jacobian: Option<&mut [f64]>| {
         let mut problem = Problem::new();
         let point = problem.add(&space, numbers);
-        let factor = Seen { point, camera_from_anchor, camera, pixel: Point2::new(300.0, 200.0), sigma_px: 0.5 };
+        let factor =
+            Seen { point, camera_from_anchor, camera, pixel: Point2::new(300.0, 200.0), sigma_px: 0.5 };
         let mut residual = [0.0; 2];
         assert!(factor.evaluate(&problem.values(), &mut residual, jacobian));
         residual

@@ -20,7 +20,7 @@ use tempfile::TempDir;
 macro_rules! for_each_table {
     ($callback:ident) => {
         $callback! {
-            frames, trajectories, point_landmarks, line_landmarks, structural_groups, map_points, map_lines,
+            frames, trajectories, point_landmarks, line_landmarks, structural_groups, map_points, map_lines, tracking, iterations,
             point_correspondences, line_correspondences, graph_poses, graph_points, graph_lines,
             graph_factors, frame_statistics, point_observations, line_observations, point_measurements,
             line_measurements

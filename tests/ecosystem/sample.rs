@@ -181,6 +181,26 @@ fn estimate(sequence: &mut Sequence) {
             covariance: (point.point_id.0 % 2 == 0).then(|| vec![1e-4, 0.0, 0.0, 1e-4, 0.0, 1e-4]),
         }));
     }
+    sequence.tracking.extend(sequence.frames.iter().map(|frame| TrackedFrame {
+        estimate: registry::MAP_TO_FRAME.to_owned(),
+        frame_id: frame.frame_id,
+        state: if frame.frame_id.0 == 0 { registry::GAUGE } else { registry::TRACKED }.to_owned(),
+        points: 7,
+        lines: 2,
+        point_inliers: 6,
+        line_inliers: 2,
+        residual_rms: (frame.frame_id.0 > 0).then_some(0.75),
+    }));
+    sequence.iterations.extend((0..3_i32).map(|step| Iteration {
+        estimate: registry::POINT_BA.to_owned(),
+        iteration: step.into(),
+        cost: 0.5_f64.powi(step),
+        cost_change: (step > 0).then_some(0.5_f64.powi(step)),
+        gradient_max: 1e-3,
+        step_norm: (step > 0).then_some(0.25),
+        damping: 1e4,
+        accepted: true,
+    }));
     sequence.map_lines.extend(sequence.line_landmarks.iter().map(|line| MapLine {
         estimate: "unrefined".to_owned(),
         line_id: line.line_id,

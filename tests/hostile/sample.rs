@@ -125,6 +125,7 @@ pub(crate) fn dictionary_bomb() -> Vec<u8> {
             Arc::clone(&numbers),
             Arc::clone(&numbers),
             Arc::clone(&numbers),
+            arrow::array::new_null_array(schema.field(5).data_type(), 1000),
         ];
         writer.write(&RecordBatch::try_new(Arc::clone(&schema), columns).unwrap()).unwrap();
     }

@@ -21,7 +21,7 @@ fn truth(sequence: &Sequence) -> Vec<(FrameId, Pose)> {
 }
 
 fn tracked(noise: NoiseModel) -> (Sequence, Estimate, f64) {
-    let sequence = measured(&load("sphere2").unwrap(), &NoiseRecipe::new(noise), 1);
+    let sequence = measured(&load("box1").unwrap(), &NoiseRecipe::new(noise), 1);
     let frames = MeasuredFrame::of(&sequence);
     let truth = truth(&sequence);
     let mut tracker = CloudTracker::new(&sequence.manifest.cameras, truth[0].1);
@@ -38,7 +38,7 @@ fn tracked(noise: NoiseModel) -> (Sequence, Estimate, f64) {
 #[test]
 fn the_tracker_is_exact_without_noise() {
     let (_, _, error) = tracked(NoiseModel::None);
-    // Metres: rounding over a hundred frames.
+    // Metres: rounding over some hundred frames.
     assert!(error < 1e-9, "{error:e}");
 }
 

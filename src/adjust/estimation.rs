@@ -72,7 +72,7 @@ impl Estimation {
         estimation.add_points(observations, options)?;
         match options.lines {
             LineKind::Orthonormal => {
-                estimation.add_lines(&Arc::new(LineSpace), observations, grouping, options)?
+                estimation.add_lines(&Arc::new(LineSpace), observations, grouping, options)?;
             }
             LineKind::Endpoints => {
                 estimation.add_lines(&Arc::new(EndpointsSpace), observations, grouping, options)?;

@@ -104,8 +104,9 @@ fn rotations(results: &Results) -> String {
 }
 
 fn head(methods: &[&str]) -> String {
-    let columns: String =
-        methods.iter().map(|method| format!("<th scope=\"col\">{}</th>", escaped(method))).collect();
+    let columns = methods
+        .iter()
+        .fold(String::new(), |columns, method| columns + "<th scope=\"col\">" + &escaped(method) + "</th>");
     format!(
         "<div class=\"wide\">\n<table>\n<thead><tr><th scope=\"col\">sequence</th>{columns}</tr></thead>\n<tbody>\n"
     )

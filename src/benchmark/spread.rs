@@ -24,18 +24,18 @@ impl Spread {
         let mut sorted: Vec<f64> = numbers.into_iter().filter(|number| !number.is_nan()).collect();
         sorted.sort_by(f64::total_cmp);
         let (min, max) = (*sorted.first()?, *sorted.last()?);
-        let quantile = |part: f64| {
-            let place = part * (sorted.len() - 1) as f64;
-            let below = place.floor();
-            let (low, high) = (sorted[below as usize], sorted[place.ceil() as usize]);
-            low + (high - low) * (place - below)
+        // Of quarters: the place is a whole number of them.
+        let quantile = |quarters: usize| {
+            let place = quarters * (sorted.len() - 1);
+            let (low, high) = (sorted[place / 4], sorted[place.div_ceil(4)]);
+            low + (high - low) * (place % 4) as f64 / 4.0
         };
         Some(Self {
             count: sorted.len(),
             min,
-            lower: quantile(0.25),
-            median: quantile(0.5),
-            upper: quantile(0.75),
+            lower: quantile(1),
+            median: quantile(2),
+            upper: quantile(3),
             max,
         })
     }

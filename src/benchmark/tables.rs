@@ -141,13 +141,13 @@ pub fn summary_table(results: &Results) -> ResultTable {
             "seeds",
             "1",
             "cells with an estimate",
-            rows.iter().map(|row| row.ape_rmse_cm.map(|spread| spread.count as i64)),
+            rows.iter().map(|row| row.ape_rmse_cm.map(|spread| whole(spread.count))),
         )
         .integer(
             "failed",
             "1",
             "cells without one",
-            rows.iter().map(|row| Some(row.failed.as_ref().map_or(0, |(count, _)| *count as i64))),
+            rows.iter().map(|row| Some(row.failed.as_ref().map_or(0, |(count, _)| whole(*count)))),
         )
         .number(
             "ape_rmse_cm",
@@ -187,7 +187,7 @@ pub fn summary_table(results: &Results) -> ResultTable {
             "predicted",
             "1",
             "most frames of a cell whose pose no measurement supports",
-            rows.iter().map(|row| Some(row.predicted as i64)),
+            rows.iter().map(|row| Some(whole(row.predicted))),
         )
         .number("seconds", "s", "wall time of the method; median over seeds", median(&|row| row.seconds))
         .number(
@@ -210,6 +210,11 @@ pub fn summary_table(results: &Results) -> ResultTable {
             rows.iter().map(|row| row.paper.as_ref().map(|paper| paper.ape_cm[1])),
         )
         .number("over_paper", "1", "median error over the paper's", rows.iter().map(Row::over_paper))
+}
+
+/// A count as a whole number of a table.
+fn whole(count: usize) -> i64 {
+    i64::try_from(count).unwrap_or(i64::MAX)
 }
 
 /// Digits that three figures need.

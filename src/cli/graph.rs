@@ -29,6 +29,7 @@ enum Kind {
   os graph tracked -o graph --estimate map-to-frame
   os graph tracked.mcap -o graph.mcap --estimate map-to-frame --key-frames --min-views 3
   os graph tracked -o loops --estimate frame-to-frame --kind pose-graph --loop-gap 50")]
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag of the command line")]
 pub(super) struct Args {
     /// Sequence with measurements and an estimate: an MCAP file or a Parquet folder.
     sequence: PathBuf,

@@ -1,6 +1,6 @@
 //! `os track`: where the camera was, and what it saw, out of the measurements.
 
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -184,7 +184,8 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     if let Some(rms) = rms {
         writeln!(stdout, "residuals of inliers: {rms:.2} sigma (median of the frames' RMS)")?;
     }
-    writeln!(stdout, "{seconds:.1} s, {:.0} frames/s", frames.len() as f64 / seconds.max(1e-9))?;
+    // Results are the same every time; this is not.
+    writeln!(io::stderr(), "{seconds:.1} s, {:.0} frames/s", frames.len() as f64 / seconds.max(1e-9))?;
     writeln!(stdout, "{}: {size}", args.output.display())?;
     Ok(outcome)
 }

@@ -133,7 +133,7 @@ fn factor(
     let upper = (0..6).flat_map(|row| (row..6).map(move |column| (row, column)));
     GraphFactor {
         graph: graph.to_owned(),
-        factor_id: factor_id as i64,
+        factor_id: i64::try_from(factor_id).unwrap_or(i64::MAX),
         kind: registry::RELATIVE_POSE.to_owned(),
         frame_id: Some(frame.frame.frame_id),
         other_frame_id: Some(other.frame.frame_id),

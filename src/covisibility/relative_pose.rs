@@ -66,24 +66,23 @@ pub fn relative_pose(
     if points.len() + lines.len() < LEAST_MATCHES {
         return None;
     }
-    let start = match start {
-        Some(start) => *start,
-        None => {
-            let rows: Vec<_> = points
-                .iter()
-                .map(|point| {
-                    // How far the place moves in the image of a camera beside the first one.
-                    let spread = point.covariance.trace().sqrt() * camera.fx.abs() / point.point.z.abs();
-                    (point.point, point.pixel, (noise.sigma_px * noise.sigma_px + spread * spread).sqrt())
-                })
-                .collect();
-            let options = RansacOptions { seed, ..RansacOptions::default() };
-            let found = ransac_pose(camera, &rows, &options).ok()?;
-            if found.inliers.len() < LEAST_CONSENSUS {
-                return None;
-            }
-            found.camera_from_world
+    let start = if let Some(start) = start {
+        *start
+    } else {
+        let rows: Vec<_> = points
+            .iter()
+            .map(|point| {
+                // How far the place moves in the image of a camera beside the first one.
+                let spread = point.covariance.trace().sqrt() * camera.fx.abs() / point.point.z.abs();
+                (point.point, point.pixel, (noise.sigma_px * noise.sigma_px + spread * spread).sqrt())
+            })
+            .collect();
+        let options = RansacOptions { seed, ..RansacOptions::default() };
+        let found = ransac_pose(camera, &rows, &options).ok()?;
+        if found.inliers.len() < LEAST_CONSENSUS {
+            return None;
         }
+        found.camera_from_world
     };
     let loss = RobustLoss::Cauchy { sigma: DOUBT_SIGMA };
     let found = refine_pose(camera, noise.sigma_px, &start, &points, &lines, loss).ok()?;

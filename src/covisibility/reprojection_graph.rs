@@ -111,7 +111,7 @@ pub fn reprojection_graph(
     let mut factors: Vec<GraphFactor> = Vec::new();
     let factor = |kind: &str, factors: &Vec<GraphFactor>| GraphFactor {
         graph: graph.clone(),
-        factor_id: factors.len() as i64,
+        factor_id: i64::try_from(factors.len()).unwrap_or(i64::MAX),
         kind: kind.to_owned(),
         ..GraphFactor::default()
     };
@@ -141,7 +141,7 @@ pub fn reprojection_graph(
     for group in groups.iter().filter(|group| group.kind == registry::PARALLEL) {
         for line_id in group.line_ids.iter().filter(|line_id| known_lines.contains(line_id)) {
             let (group_id, line_id) = (Some(group.group_id), Some(*line_id));
-            factors.push(GraphFactor { group_id, line_id, ..factor(registry::PARALLELISM, &factors) });
+            factors.push(GraphFactor { line_id, group_id, ..factor(registry::PARALLELISM, &factors) });
             summary.parallelism_factors += 1;
         }
     }

@@ -37,8 +37,10 @@ def keys_of(table: str) -> list[str]:
             return ["frame_id"]
         case ["structural", "groups"]:
             return ["group_id"]
-        case ["trajectories"]:
+        case ["trajectories"] | ["tracking"]:
             return ["estimate", "frame_id"]
+        case ["iterations"]:
+            return ["estimate", "iteration"]
         case ["graph", "poses"]:
             return ["graph", "frame_id"]
         case ["graph", "factors"]:

@@ -21,7 +21,7 @@ fn truth(sequence: &Sequence) -> Vec<(FrameId, Pose)> {
 }
 
 fn tracked(noise: NoiseModel) -> (Sequence, Estimate, f64) {
-    let sequence = measured(&load("box1").unwrap(), &NoiseRecipe::new(noise), 1);
+    let sequence = measured(&load("box2").unwrap(), &NoiseRecipe::new(noise), 1);
     let frames = MeasuredFrame::of(&sequence);
     let truth = truth(&sequence);
     let mut tracker = CloudTracker::new(&sequence.manifest.cameras, truth[0].1);

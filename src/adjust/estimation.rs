@@ -8,7 +8,7 @@ use super::line_form::{CayleySpace, EndpointsSpace, LineForm};
 use super::loss::Loss;
 use super::minimise::Step;
 use super::observations::Observations;
-use super::options::{LineKind, Options, Parallelism};
+use super::options::{LineKind, Method, Options, Parallelism};
 use super::parametrisation::{DirectionSpace, LineSpace, PoseSpace, VectorSpace};
 use super::point_handle::PointHandle;
 use super::pose_factor::{PosePriorFactor, RelativePoseFactor, ScaleFactor};
@@ -23,10 +23,13 @@ use nalgebra::{Matrix3x4, Matrix6, Point2, Point3, SMatrix, Vector3, Vector6};
 use std::marker::PhantomData;
 use std::sync::Arc;
 
-/// A frame whose measurements leave its pose open, or just determine it, gets this prior about where it began: radians and metres.
+/// A frame whose measurements leave its pose open, or just determine it, gets a prior about where it began: radians and metres.
 ///
-/// Three points in pixels have four exact poses and no redundancy: noise moves such a frame by half a metre.
-const WEAK_PRIOR: [f64; 2] = [0.3, 1.0];
+/// In the paper's adjustments it does no more than keep the equations solvable. In a structural one it says that trackers know where
+/// such a frame is from its neighbours: three points have no redundancy, and noise moves such a frame by half a metre.
+fn weak_prior(method: Method) -> [f64; 2] {
+    if method == Method::Structural { [0.1, 0.2] } else { [1.0, 100.0] }
+}
 
 /// How far from a right angle directions may be that are perpendicular, radians: as good as never.
 const RIGHT_ANGLE_RAD: f64 = 1e-5;
@@ -247,7 +250,8 @@ impl Estimation {
                 self.problem.hold(self.poses[frame]);
             } else if numbers[frame] < ENOUGH_FOR_A_POSE && !has_prior(frame) {
                 summary.weak.push(id);
-                let root = diagonal_root(WEAK_PRIOR[0], WEAK_PRIOR[1]);
+                let [turn, shift] = weak_prior(options.method);
+                let root = diagonal_root(turn, shift);
                 let world_from_camera = vertex.camera_from_world.inverse();
                 weak.push(PosePriorFactor { variables: [self.poses[frame]], world_from_camera, root });
             }

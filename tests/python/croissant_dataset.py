@@ -49,3 +49,4 @@ def main(folder: Path, rows: dict[str, list[expected.Row]]) -> None:
 if __name__ == "__main__":
     logging.getLogger("absl").setLevel(logging.ERROR)
     main(Path(sys.argv[1]), expected.load(Path(sys.argv[2])))
+    expected.leave()

@@ -1,8 +1,10 @@
 """What the sequence holds, as JSON lines that the test wrote from its rows in memory."""
 
 import json
+import os
+import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 Row = dict[str, Any]
 
@@ -22,3 +24,10 @@ def plain(rows: list[Row]) -> list[Row]:
 
 def _plain(value: Any) -> Any:
     return value.hex() if isinstance(value, bytes) else value
+
+
+def leave() -> NoReturn:
+    """Ends a script whose checks all passed, at once: threads of Arrow now and then abort an interpreter that
+    takes itself apart (apache/arrow#34314)."""
+    sys.stdout.flush()
+    os._exit(0)

@@ -121,3 +121,4 @@ def main(path: Path, rows: dict[str, list[expected.Row]], schema_folder: Path) -
 
 if __name__ == "__main__":
     main(Path(sys.argv[1]), expected.load(Path(sys.argv[2])), Path(sys.argv[3]))
+    expected.leave()

@@ -12,6 +12,8 @@ import numpy as np
 import polars as pl
 import pyarrow.parquet as pq
 
+import expected
+
 # Pixels reach 640, so rounding alone makes about 1e-13 of relative error.
 EXACT_PX = 1e-9
 
@@ -66,3 +68,4 @@ def main(folder: Path) -> None:
 
 if __name__ == "__main__":
     main(Path(sys.argv[1]))
+    expected.leave()

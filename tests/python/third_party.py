@@ -14,6 +14,8 @@ import polars as pl
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+import expected
+
 LEFT_OUT = {
     "point_landmarks": ["descriptor"],
     "point_observations": ["depth"],
@@ -55,3 +57,4 @@ def bare_type(data_type: pa.DataType) -> pa.DataType:
 
 if __name__ == "__main__":
     main(sys.argv[1], Path(sys.argv[2]), Path(sys.argv[3]))
+    expected.leave()

@@ -384,28 +384,14 @@ impl Estimation {
             TrajectoryPose { covariance: of_pose.next(), ..row }
         });
         let mut of_point = covariances.points.drain(..);
-        let points = observations.points.iter().map(|point| MapPoint {
-            estimate: name.clone(),
-            point_id: point.point_id,
-            x: point.position.x,
-            y: point.position.y,
-            z: point.position.z,
-            covariance: of_point.next(),
+        let points = observations.points.iter().map(|point| {
+            let row = MapPoint::new(name.clone(), point.point_id, &point.position);
+            MapPoint { covariance: of_point.next(), ..row }
         });
         let mut of_line = covariances.lines.drain(..);
         let lines = observations.lines.iter().map(|line| {
-            let Segment { start, end } = line.segment;
-            MapLine {
-                estimate: name.clone(),
-                line_id: line.line_id,
-                start_x: start.x,
-                start_y: start.y,
-                start_z: start.z,
-                end_x: end.x,
-                end_y: end.y,
-                end_z: end.z,
-                covariance: of_line.next(),
-            }
+            let row = MapLine::new(name.clone(), line.line_id, &line.segment);
+            MapLine { covariance: of_line.next(), ..row }
         });
         let iterations = (0..).zip(steps).map(|(iteration, step)| Iteration {
             estimate: name.clone(),

@@ -60,32 +60,16 @@ impl Grouping {
         summary: &mut Summary,
     ) -> Self {
         let mut found = Self::none(observations);
-        let places: BTreeMap<LineId, usize> =
-            observations.lines.iter().enumerate().map(|(at, line)| (line.line_id, at)).collect();
         summary.released.clear();
         let Ok(uncertainty) = Uncertainty::of(&estimation.problem) else { return found };
         let (mut group_places, mut commons) = (BTreeMap::new(), Vec::new());
-        let mut taken = BTreeSet::new();
-        for group in graph.groups.iter().filter(|group| !group.is_made_of_groups()) {
-            let ids: BTreeSet<LineId> = group.line_ids.iter().copied().collect();
-            // A line in two groups is tied by the first.
-            let lines: Vec<usize> = ids
-                .iter()
-                .filter_map(|id| places.get(id).copied())
-                .filter(|line| taken.insert(*line))
-                .collect();
-            let (kept, common, released) =
-                agreeing(group.group_id, &lines, observations, estimation, &uncertainty);
+        for Candidates { group_id, ids, lines } in candidates(graph, observations) {
+            let (kept, common, released) = agreeing(group_id, &lines, observations, estimation, &uncertainty);
             summary.released.extend(released);
-            if kept.len() < 2 {
-                continue;
+            if let Some(place) = found.tie(&kept, common.direction) {
+                group_places.insert(group_id, (place, ids));
+                commons.push(common);
             }
-            group_places.insert(group.group_id, (found.directions.len(), ids));
-            for line in kept {
-                found.of_line[line] = Some(found.directions.len());
-            }
-            found.directions.push(common.direction);
-            commons.push(common);
         }
         found.find_right_angles(graph, &group_places, |a, b| commons[a].is_upright(&commons[b]));
         summary.grouped = found.of_line.iter().flatten().count();
@@ -95,17 +79,8 @@ impl Grouping {
     /// Groups as they are where values are the truth: lines within a thousandth of a radian of their group's direction.
     pub(super) fn given(graph: &FactorGraph, observations: &Observations, summary: &mut Summary) -> Self {
         let mut found = Self::none(observations);
-        let places: BTreeMap<LineId, usize> =
-            observations.lines.iter().enumerate().map(|(at, line)| (line.line_id, at)).collect();
         let mut group_places = BTreeMap::new();
-        let mut taken = BTreeSet::new();
-        for group in graph.groups.iter().filter(|group| !group.is_made_of_groups()) {
-            let ids: BTreeSet<LineId> = group.line_ids.iter().copied().collect();
-            let lines: Vec<usize> = ids
-                .iter()
-                .filter_map(|id| places.get(id).copied())
-                .filter(|line| taken.insert(*line))
-                .collect();
+        for Candidates { group_id, ids, lines } in candidates(graph, observations) {
             let direction = |line: usize| observations.lines[line].line.direction;
             let Some(common) = consensus(&lines, direction) else { continue };
             let (kept, off): (Vec<usize>, Vec<usize>) =
@@ -113,25 +88,33 @@ impl Grouping {
             for line in off {
                 summary.released.push(ReleasedLine {
                     line_id: observations.lines[line].line_id,
-                    group_id: group.group_id,
+                    group_id,
                     angle_rad: libm::asin(common.cross(&direction(line)).norm().min(1.0)),
                     chi_squared: f64::INFINITY,
                 });
             }
-            if kept.len() < 2 {
-                continue;
+            if let Some(place) = found.tie(&kept, common) {
+                group_places.insert(group_id, (place, ids));
             }
-            group_places.insert(group.group_id, (found.directions.len(), ids));
-            for line in kept {
-                found.of_line[line] = Some(found.directions.len());
-            }
-            found.directions.push(common);
         }
         let directions = found.directions.clone();
         let is_upright = |a: usize, b: usize| directions[a].dot(&directions[b]).abs() < EXACT_RAD;
         found.find_right_angles(graph, &group_places, is_upright);
         summary.grouped = found.of_line.iter().flatten().count();
         found
+    }
+
+    /// Gives lines one direction and its place among all; `None` for fewer than two, which have nothing to share.
+    fn tie(&mut self, lines: &[usize], direction: Vector3<f64>) -> Option<usize> {
+        let place = self.directions.len();
+        if lines.len() < 2 {
+            return None;
+        }
+        for line in lines {
+            self.of_line[*line] = Some(place);
+        }
+        self.directions.push(direction);
+        Some(place)
     }
 
     /// Right angles that `manhattan` and `atlanta` groups declare, unless the estimated directions contradict them.
@@ -155,6 +138,29 @@ impl Grouping {
             }
         }
     }
+}
+
+/// A parallel group and those of its lines that are there, by their places.
+struct Candidates {
+    group_id: GroupId,
+    ids: BTreeSet<LineId>,
+    lines: Vec<usize>,
+}
+
+/// The parallel groups of a graph; a line in two groups is a candidate of the first.
+fn candidates(graph: &FactorGraph, observations: &Observations) -> Vec<Candidates> {
+    let places: BTreeMap<LineId, usize> =
+        observations.lines.iter().enumerate().map(|(at, line)| (line.line_id, at)).collect();
+    let mut taken = BTreeSet::new();
+    let parallel = graph.groups.iter().filter(|group| !group.is_made_of_groups());
+    parallel
+        .map(|group| {
+            let ids: BTreeSet<LineId> = group.line_ids.iter().copied().collect();
+            let present = ids.iter().filter_map(|id| places.get(id).copied());
+            let lines = present.filter(|line| taken.insert(*line)).collect();
+            Candidates { group_id: group.group_id, ids, lines }
+        })
+        .collect()
 }
 
 /// The direction that lines have in common, length one, and its covariance.

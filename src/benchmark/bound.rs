@@ -75,31 +75,11 @@ fn truth(sequence: &Sequence) -> Estimate {
     let mut points: BTreeMap<PointId, Point3<f64>> =
         sequence.point_landmarks.iter().map(|row| (row.point_id, Point3::new(row.x, row.y, row.z))).collect();
     points.extend(triangulated(sequence, &points));
-    let map_point = |(point_id, at): (PointId, Point3<f64>)| MapPoint {
-        estimate: name.clone(),
-        point_id,
-        x: at.x,
-        y: at.y,
-        z: at.z,
-        covariance: None,
-    };
+    let map_point = |(point_id, at): (PointId, Point3<f64>)| MapPoint::new(name.clone(), point_id, &at);
     let mut lines: BTreeMap<LineId, MapLine> = sequence
         .line_landmarks
         .iter()
-        .map(|row| {
-            let line = MapLine {
-                estimate: name.clone(),
-                line_id: row.line_id,
-                start_x: row.start_x,
-                start_y: row.start_y,
-                start_z: row.start_z,
-                end_x: row.end_x,
-                end_y: row.end_y,
-                end_z: row.end_z,
-                covariance: None,
-            };
-            (row.line_id, line)
-        })
+        .map(|row| (row.line_id, MapLine::new(name.clone(), row.line_id, &row.segment())))
         .collect();
     let unrefined = sequence.map_lines.iter().filter(|row| row.estimate == registry::UNREFINED);
     lines.extend(unrefined.map(|row| (row.line_id, row.clone())));

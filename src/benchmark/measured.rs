@@ -28,13 +28,7 @@ pub fn measured(sequence: &Sequence, noise: &NoiseRecipe, seed: u64) -> Sequence
     if !lines {
         made.line_measurements.clone_from(&sequence.line_measurements);
     }
-    let observed = Sequence {
-        frames: sequence.frames.clone(),
-        point_observations: sequence.point_observations.clone(),
-        line_observations: sequence.line_observations.clone(),
-        ..Sequence::default()
-    };
-    for FrameBundle { frame, point_observations, line_observations, .. } in observed.bundles() {
+    for FrameBundle { frame, point_observations, line_observations, .. } in sequence.bundles() {
         let Some(camera) = sequence.manifest.camera(frame.camera_id) else { continue };
         let (of_points, of_lines) =
             noise.measure(camera, frame.frame_id, &point_observations, &line_observations, seed);

@@ -8,13 +8,12 @@ use anyhow::Context;
 use serde_json::json;
 
 use super::progress::Progress;
-use super::{Outcome, left_behind, text};
+use super::{Outcome, extended, text};
 use crate::adjust::{
     Adjusted, LineKind, Loss, Method, Optimiser, Options, Parallelism, PointForm, SolverOptions, Summary,
     Tally, adjust_watched,
 };
-use crate::format::{self, WriteOptions};
-use crate::structure::{Estimate, FactorGraph, FrameId, Sequence, registry};
+use crate::structure::{Estimate, FactorGraph, FrameId, Sequence};
 
 /// Names listed of a kind of frame or line before the rest is only counted.
 const MOST_NAMES: usize = 8;
@@ -180,24 +179,10 @@ impl Args {
 }
 
 pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome> {
-    let reader = format::open(&args.sequence)?;
-    if args.output.exists() {
-        if args.output.canonicalize()? == args.sequence.canonicalize()? {
-            anyhow::bail!("{}: is the input itself", args.output.display());
-        }
-        if !args.force {
-            return Err(format::Error::Exists { path: args.output.clone() }.into());
-        }
-    }
-    let outcome = left_behind::warn(&reader)?;
-    let mut sequence = reader.read_all()?;
+    let (mut sequence, outcome) = extended::read(&args.sequence, &args.output, args.force)?;
     let options = args.options();
     let name = options.estimate_name().to_owned();
-    if !args.replace && Estimate::is_in(&sequence, &name) {
-        anyhow::bail!(
-            "there is an estimate `{name}` already; --replace takes its place, --name gives this one another"
-        );
-    }
+    extended::check_name("an estimate", &name, Estimate::is_in(&sequence, &name), args.replace)?;
     let graph = pick(args.graph.as_deref(), &sequence)?;
     if args.graph.is_none() {
         writeln!(io::stderr(), "adjusting the graph `{}`", graph.name)?;
@@ -205,17 +190,14 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     let adjusted = adjust_on_threads(&graph, &options, args.threads)?;
     let Adjusted { estimate, summary } = adjusted;
     estimate.put(&mut sequence);
-    registry::SPEC_VERSION.clone_into(&mut sequence.manifest.spec_version);
-    sequence.manifest.tables.clear();
     sequence.sort();
-    let write = WriteOptions { force: args.force, ..WriteOptions::default() };
-    format::write(&args.output, &sequence, write)?;
+    let size = extended::write(&args.output, sequence, args.force)?;
     if args.json {
         serde_json::to_writer_pretty(&mut *stdout, &as_json(&graph.name, &name, &summary))?;
         writeln!(stdout)?;
     } else {
         write!(stdout, "{}", as_text(&graph.name, &name, &summary))?;
-        writeln!(stdout, "{}: {}", args.output.display(), text::bytes(text::size_on_disk(&args.output)))?;
+        writeln!(stdout, "{}: {}", args.output.display(), size)?;
     }
     Ok(outcome)
 }

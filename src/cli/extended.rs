@@ -23,7 +23,7 @@ pub(super) fn read(input: &Path, output: &Path, force: bool) -> anyhow::Result<(
     }
     let reader = format::open(input)?;
     let outcome = left_behind::warn(&reader)?;
-    let sequence = format::read(input).with_context(|| format!("{}: cannot be read", input.display()))?;
+    let sequence = reader.read_all().with_context(|| format!("{}: cannot be read", input.display()))?;
     Ok((sequence, outcome))
 }
 
@@ -37,7 +37,7 @@ pub(super) fn write(output: &Path, mut sequence: Sequence, force: bool) -> anyho
 
 /// Refuses a name that is taken already, unless it is to be replaced.
 pub(super) fn check_name(kind: &str, name: &str, is_taken: bool, replace: bool) -> anyhow::Result<()> {
-    anyhow::ensure!(!name.is_empty(), "the name of the {kind} is empty");
+    anyhow::ensure!(!name.is_empty(), "an empty name is no name of {kind}");
     anyhow::ensure!(
         !is_taken || replace,
         "the sequence has {kind} `{name}` already: choose another name with --name, or replace it with --replace"

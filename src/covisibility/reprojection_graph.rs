@@ -86,16 +86,7 @@ pub fn reprojection_graph(
         .lines
         .iter()
         .filter(|row| line_views.get(&row.line_id).is_some_and(|views| *views >= options.least_views))
-        .map(|row| GraphLine {
-            graph: graph.clone(),
-            line_id: row.line_id,
-            start_x: row.start_x,
-            start_y: row.start_y,
-            start_z: row.start_z,
-            end_x: row.end_x,
-            end_y: row.end_y,
-            end_z: row.end_z,
-        })
+        .map(|row| GraphLine::new(graph.clone(), row.line_id, &row.segment()))
         .collect();
     let in_map: BTreeSet<PointId> = estimate.points.iter().map(|row| row.point_id).collect();
     let lines_in_map: BTreeSet<LineId> = estimate.lines.iter().map(|row| row.line_id).collect();

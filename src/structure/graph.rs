@@ -133,4 +133,4 @@ record! {
     }
 }
 
-stored_segment!(GraphLine);
+stored_segment!(GraphLine { graph: String, line_id: LineId });

@@ -1,5 +1,7 @@
 //! Estimated landmarks: the map that goes with an estimated trajectory.
 
+use nalgebra::Point3;
+
 use super::id::{LineId, PointId};
 use super::record::record;
 use super::segment_row::stored_segment;
@@ -61,4 +63,12 @@ record! {
     }
 }
 
-stored_segment!(MapLine);
+stored_segment!(MapLine { estimate: String, line_id: LineId } absent: covariance);
+
+impl MapPoint {
+    /// A row with its point, metres in `world`.
+    #[must_use]
+    pub fn new(estimate: String, point_id: PointId, at: &Point3<f64>) -> Self {
+        Self { estimate, point_id, x: at.x, y: at.y, z: at.z, covariance: None }
+    }
+}

@@ -173,25 +173,10 @@ impl Tracker for ClassicTracker {
     }
 
     fn map(&self) -> TrackerMap {
-        let points = self.points.iter().map(|(id, mean)| {
-            let place = mean.place();
-            let estimate = String::new();
-            MapPoint { estimate, point_id: *id, x: place.x, y: place.y, z: place.z, covariance: None }
-        });
+        let points = self.points.iter().map(|(id, mean)| MapPoint::new(String::new(), *id, &mean.place()));
         let lines = self.lines.iter().map(|(id, means)| {
             let [start, end] = means.map(|mean| mean.place());
-            let Segment { start, end } = Segment { start, end };
-            MapLine {
-                estimate: String::new(),
-                line_id: *id,
-                start_x: start.x,
-                start_y: start.y,
-                start_z: start.z,
-                end_x: end.x,
-                end_y: end.y,
-                end_z: end.z,
-                covariance: None,
-            }
+            MapLine::new(String::new(), *id, &Segment { start, end })
         });
         TrackerMap { points: points.collect(), lines: lines.collect() }
     }

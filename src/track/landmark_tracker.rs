@@ -398,27 +398,11 @@ impl Tracker for LandmarkTracker {
 }
 
 fn map_point(point_id: PointId, landmark: &PointLandmark, whole: bool) -> MapPoint {
-    MapPoint {
-        estimate: String::new(),
-        point_id,
-        x: landmark.point.x,
-        y: landmark.point.y,
-        z: landmark.point.z,
-        covariance: whole.then(|| upper_triangle(&landmark.covariance)),
-    }
+    let covariance = whole.then(|| upper_triangle(&landmark.covariance));
+    MapPoint { covariance, ..MapPoint::new(String::new(), point_id, &landmark.point) }
 }
 
 fn map_line(line_id: LineId, landmark: &LineLandmark, whole: bool) -> MapLine {
-    let (start, end) = (landmark.segment.start, landmark.segment.end);
-    MapLine {
-        estimate: String::new(),
-        line_id,
-        start_x: start.x,
-        start_y: start.y,
-        start_z: start.z,
-        end_x: end.x,
-        end_y: end.y,
-        end_z: end.z,
-        covariance: landmark.covariance_of_ends().filter(|_| whole).map(|matrix| upper_triangle(&matrix)),
-    }
+    let covariance = landmark.covariance_of_ends().filter(|_| whole).map(|matrix| upper_triangle(&matrix));
+    MapLine { covariance, ..MapLine::new(String::new(), line_id, &landmark.segment) }
 }

@@ -180,18 +180,8 @@ impl Found {
                 .map_err(|cause| Error::Line { line_id, cause })?;
             rows.push(row);
             segments.push(*segment);
-            let before = self.lines[place].segment;
-            unrefined.push(MapLine {
-                estimate: registry::UNREFINED.to_owned(),
-                line_id,
-                start_x: before.start.x,
-                start_y: before.start.y,
-                start_z: before.start.z,
-                end_x: before.end.x,
-                end_y: before.end.y,
-                end_z: before.end.z,
-                covariance: None,
-            });
+            let before = &self.lines[place].segment;
+            unrefined.push(MapLine::new(registry::UNREFINED.to_owned(), line_id, before));
         }
         let points: Vec<PointLandmark> = (0..)
             .zip(self.points.iter().enumerate().filter(|(place, _)| kept(&points, *place)))

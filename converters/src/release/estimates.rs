@@ -6,9 +6,7 @@ use super::ledger::Ledger;
 use super::poses::{Poses, poses};
 use crate::text_release::{Association, TextSequence};
 use nalgebra::Point3;
-use open_structure::structure::{
-    FrameId, LineId, MapLine, MapPoint, PointId, Sequence, TrajectoryPose, registry,
-};
+use open_structure::structure::{FrameId, MapLine, MapPoint, Sequence, TrajectoryPose, registry};
 use std::collections::BTreeMap;
 
 /// One estimate: whatever of a path and a map it has.
@@ -160,31 +158,12 @@ pub(super) fn add_estimates(estimates: &Estimates, sequence: &mut Sequence) {
         sequence
             .trajectories
             .extend(poses.map(|(id, pose)| TrajectoryPose::new(name.clone(), *id, pose.row)));
-        sequence.map_points.extend(estimate.points.iter().map(|(id, at)| map_point(name, *id, at)));
-        sequence.map_lines.extend(estimate.lines.iter().map(|(id, segment)| map_line(name, *id, segment)));
-    }
-}
-
-fn map_point(estimate: &str, point_id: PointId, at: &Point3<f64>) -> MapPoint {
-    MapPoint { estimate: estimate.to_owned(), point_id, x: at.x, y: at.y, z: at.z, covariance: None }
-}
-
-/// A row of `map_lines`.
-pub(super) fn map_line(
-    estimate: &str,
-    line_id: LineId,
-    segment: &open_structure::geometry::Segment,
-) -> MapLine {
-    MapLine {
-        estimate: estimate.to_owned(),
-        line_id,
-        start_x: segment.start.x,
-        start_y: segment.start.y,
-        start_z: segment.start.z,
-        end_x: segment.end.x,
-        end_y: segment.end.y,
-        end_z: segment.end.z,
-        covariance: None,
+        sequence
+            .map_points
+            .extend(estimate.points.iter().map(|(id, at)| MapPoint::new(name.to_owned(), *id, at)));
+        sequence
+            .map_lines
+            .extend(estimate.lines.iter().map(|(id, segment)| MapLine::new(name.to_owned(), *id, segment)));
     }
 }
 
@@ -196,6 +175,7 @@ pub(super) fn frames(estimates: &Estimates) -> impl Iterator<Item = FrameId> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use open_structure::structure::PointId;
 
     #[test]
     fn a_drifted_map_keeps_its_ids_and_a_renumbered_one_does_not() {

@@ -56,20 +56,8 @@ pub(super) fn add_graph(
         .iter()
         .map(|(id, at)| GraphPoint { graph: name(), point_id: *id, x: at.x, y: at.y, z: at.z })
         .collect();
-    sequence.graph_lines = vertices
-        .lines
-        .iter()
-        .map(|(id, segment)| GraphLine {
-            graph: name(),
-            line_id: *id,
-            start_x: segment.start.x,
-            start_y: segment.start.y,
-            start_z: segment.start.z,
-            end_x: segment.end.x,
-            end_y: segment.end.y,
-            end_z: segment.end.z,
-        })
-        .collect();
+    sequence.graph_lines =
+        vertices.lines.iter().map(|(id, segment)| GraphLine::new(name(), *id, segment)).collect();
 
     // In the order of the file, whose line numbers say it.
     let mut factors: Vec<(u32, GraphFactor)> = Vec::new();

@@ -1,6 +1,5 @@
 //! What the release lost and the rest of it determines: depths of points, unrefined lines, lines never published.
 
-use super::estimates::map_line;
 use super::landmarks::{Points, Segments};
 use super::ledger::Ledger;
 use super::line_fit::{Fits, Unfit, directed};
@@ -137,7 +136,7 @@ pub(super) fn recover_unrefined(
         .iter()
         .filter_map(|(id, fit)| {
             let direction: Vector3<f64> = published.get(id)?.direction()?;
-            Some(map_line(UNREFINED, *id, &directed(fit.as_ref().ok()?.segment, &direction)))
+            Some(MapLine::new(UNREFINED.to_owned(), *id, &directed(fit.as_ref().ok()?.segment, &direction)))
         })
         .collect();
     let recovery = (!rows.is_empty()).then(|| Recovery {

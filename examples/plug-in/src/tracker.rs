@@ -79,8 +79,7 @@ impl Tracker for CloudTracker {
 
     fn map(&self) -> TrackerMap {
         let point = |(id, (sum, count)): (&PointId, &(Vector3<f64>, f64))| {
-            let place = sum / *count;
-            MapPoint { point_id: *id, x: place.x, y: place.y, z: place.z, ..MapPoint::default() }
+            MapPoint::new(String::new(), *id, &Point3::from(sum / *count))
         };
         TrackerMap { points: self.map.iter().map(point).collect(), lines: Vec::new() }
     }

@@ -63,6 +63,13 @@ pub fn adjust_watched(
     let mut grouping = Grouping::none(&observations);
     let mut estimation = Estimation::new(&observations, &grouping, options, &mut summary)?;
     let is_structural = options.method == Method::Structural;
+    if is_structural && options.smooth_motion {
+        summary.carried = observations.tie_weak_frames(&estimation);
+        if !observations.relatives.is_empty() {
+            summary.relative_factors.used = observations.relatives.len();
+            estimation = Estimation::new(&observations, &grouping, options, &mut summary)?;
+        }
+    }
     let mut steps: Vec<Step> = Vec::new();
     for round in 0..MOST_ROUNDS {
         let minimum = minimise_watched(&mut estimation.problem, &options.solver, watch)?;

@@ -225,7 +225,7 @@ fn freedom(problem: &Problem, variable: usize) -> usize {
 }
 
 /// Calls with every factor: its variables, each with its columns.
-fn for_each_factor(problem: &Problem, mut each: impl FnMut(&[(usize, Incidence)])) {
+pub(super) fn for_each_factor(problem: &Problem, mut each: impl FnMut(&[(usize, Incidence)])) {
     let mut factor = Vec::new();
     for layout in &problem.layout.batches {
         for (index, variables) in layout.variables.chunks_exact(layout.arity.max(1)).enumerate() {

@@ -15,6 +15,7 @@ mod line_form;
 mod line_sight;
 mod loss;
 mod minimise;
+mod motion;
 mod normal_equations;
 mod observations;
 mod options;

@@ -121,6 +121,8 @@ pub struct Options {
     pub fix: Vec<FrameId>,
     /// What is known of poses beforehand.
     pub priors: Vec<PosePrior>,
+    /// Whether frames whose own measurements hardly say where they are move as they did at the start; `structural` only.
+    pub smooth_motion: bool,
     /// Whether covariances of poses and landmarks are wanted.
     pub covariance: bool,
     /// When to stop, and how to step.
@@ -140,6 +142,7 @@ impl Default for Options {
             min_views: 3,
             fix: Vec::new(),
             priors: Vec::new(),
+            smooth_motion: true,
             covariance: false,
             solver: SolverOptions::default(),
         }

@@ -118,6 +118,8 @@ pub struct Summary {
     pub held: Vec<FrameId>,
     /// Frames whose measurements leave their pose open, which a weak prior keeps near the start.
     pub weak: Vec<FrameId>,
+    /// Frames whose measurements hardly say where they are, which motion carries along with their neighbours.
+    pub carried: Vec<FrameId>,
     /// Frames without any measurement that can be used, which stay where they are.
     pub unconstrained: Vec<FrameId>,
     /// Points in front of all their cameras at the start that ended behind one.

@@ -371,3 +371,42 @@ fn pixels_alone_end_at_the_scale_at_which_they_began() {
         assert!((again.initial_cost - cost).abs() < 1e-9 * cost, "{method:?}: {} {cost}", again.initial_cost);
     }
 }
+
+/// Frames 20 to 25 of a ring see three points each, and frame 26 sees nothing.
+fn ring_with_a_blind_stretch(seed: u64, with_depth: bool) -> (FactorGraph, Vec<Pose>) {
+    let scene = Scene { seed, frames: 60, sigma_px: 1.0, sigma_m: 0.05, with_depth, ..Scene::default() };
+    let mut graph = scene.graph();
+    graph.factors.retain(|factor| {
+        let frame = factor.frame_id.unwrap().0 / 10;
+        let is_one_of_three = factor.point_id.is_some_and(|point| point.0 < 3);
+        !(20..=26).contains(&frame) || (frame < 26 && is_one_of_three)
+    });
+    (graph, scene.poses())
+}
+
+#[test]
+fn motion_carries_frames_that_see_too_little() {
+    let (mut carried, mut alone) = (0.0, 0.0);
+    for seed in 1..6 {
+        let (graph, truth) = ring_with_a_blind_stretch(seed, true);
+        let worst = |smooth_motion| {
+            let options = Options { smooth_motion, ..options(Method::Structural) };
+            let Adjusted { estimate, summary } = adjust(&graph, &options).unwrap();
+            let expected: Vec<FrameId> = (20..=26).map(|frame| FrameId(10 * frame)).collect();
+            assert_eq!(summary.carried, if smooth_motion { expected } else { Vec::new() });
+            assert_eq!(summary.unconstrained.len(), usize::from(!smooth_motion));
+            worst_centre(&estimate, &truth)
+        };
+        carried += worst(true);
+        alone += worst(false);
+    }
+    assert!(carried < 0.5 * alone, "{carried} m with motion, {alone} m without");
+}
+
+#[test]
+fn motion_says_nothing_where_pixels_leave_the_scale_open() {
+    let (graph, _) = ring_with_a_blind_stretch(1, false);
+    let Adjusted { summary, .. } = adjust(&graph, &options(Method::Structural)).unwrap();
+    assert_eq!(summary.carried, []);
+    assert_eq!(summary.relative_factors.used, 0);
+}

@@ -85,6 +85,9 @@ pub(super) struct Args {
     /// Make no use of structural groups (structural).
     #[arg(long, conflicts_with = "soft")]
     no_groups: bool,
+    /// Let frames that see too little go where noise carries them, in place of moving as they did at the start (structural).
+    #[arg(long)]
+    no_motion: bool,
     /// Store covariances of poses and landmarks.
     #[arg(long)]
     covariance: bool,
@@ -171,6 +174,7 @@ impl Args {
             sigma_px: self.sigma_px,
             min_views: self.min_views,
             fix: self.fix.iter().map(|frame| FrameId(*frame)).collect(),
+            smooth_motion: !self.no_motion,
             covariance: self.covariance,
             solver,
             ..usual
@@ -276,9 +280,12 @@ fn as_text(graph: &str, name: &str, summary: &Summary) -> String {
         }
     }
     let ids = |frames: &[FrameId]| names(&frames.iter().map(|frame| frame.0).collect::<Vec<_>>());
-    for (what, frames) in
-        [("held", &summary.held), ("open", &summary.weak), ("unmeasured", &summary.unconstrained)]
-    {
+    for (what, frames) in [
+        ("held", &summary.held),
+        ("open", &summary.weak),
+        ("carried", &summary.carried),
+        ("unmeasured", &summary.unconstrained),
+    ] {
         if !frames.is_empty() {
             lines.push(format!("  {what:<10} {} poses: frames {}", frames.len(), ids(frames)));
         }
@@ -333,6 +340,7 @@ fn as_json(graph: &str, name: &str, summary: &Summary) -> serde_json::Value {
         "relative_factors": tally(&summary.relative_factors),
         "held": ids(&summary.held),
         "weak": ids(&summary.weak),
+        "carried": ids(&summary.carried),
         "unconstrained": ids(&summary.unconstrained),
         "behind": summary.behind.iter().map(|point| point.0).collect::<Vec<_>>(),
         "grouped_lines": summary.grouped,

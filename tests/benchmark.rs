@@ -168,3 +168,51 @@ fn a_foreign_estimate_stands_beside_the_methods() {
     assert_eq!(row("none")["failed"], 1);
     assert_eq!(row("map-to-frame-classic")["seeds"], 3);
 }
+
+#[test]
+fn a_sequence_that_has_changed_is_run_anew() {
+    let folder = folder();
+    let at = folder.path();
+    ended(at, &["simulate", "short.toml", "-o", "one"], 0);
+    let run = [
+        "benchmark",
+        "one",
+        "-o",
+        "results",
+        "--seeds",
+        "1",
+        "--methods",
+        "map-to-frame",
+        "--estimates",
+        "mine",
+    ];
+    let with_estimate = |shift: f64| {
+        let mut sequence = format::read(&at.join("one")).unwrap();
+        let rows = sequence.frames.iter().map(|frame| {
+            let mut pose = frame.world_from_camera().unwrap();
+            pose.translation[0] += if frame.frame_id.0 % 2 == 0 { shift } else { 0.0 };
+            TrajectoryPose::new("mine".to_owned(), frame.frame_id, pose)
+        });
+        sequence.trajectories = rows.collect();
+        format::write(&at.join("one"), &sequence, WriteOptions { force: true, ..WriteOptions::default() })
+            .unwrap();
+    };
+    let error = |method: &str| -> f64 {
+        let file = at.join(format!("results/cells/short/{method}.0.json"));
+        let cell: Value = serde_json::from_str(&fs::read_to_string(file).unwrap()).unwrap();
+        cell["outcome"]["estimated"]["ape_rmse_m"].as_f64().unwrap()
+    };
+    with_estimate(0.1);
+    ended(at, &run, 0);
+    let (mine, tracked) = (error("mine"), error("map-to-frame"));
+    with_estimate(0.4);
+    let words = ended(at, &run, 0);
+    assert!(words.contains("made anew") && error("mine") > 3.0 * mine, "{words}");
+    assert_eq!(error("map-to-frame"), tracked, "the measurements are the same");
+    // The same again: nothing is made anew.
+    assert!(!ended(at, &run, 0).contains("made anew"));
+    ended(at, &["simulate", "short.toml", "--seed", "9", "-o", "one", "--force"], 0);
+    with_estimate(0.4);
+    assert!(ended(at, &run, 0).contains("made anew"));
+    assert_ne!(error("map-to-frame"), tracked);
+}

@@ -176,3 +176,76 @@ fn noise_is_what_estimates_differ_by_and_each_step_of_the_way_comes_closer() {
     assert!(error("structural-ba") < error("map-to-frame-classic"));
     assert!(error("structural-ba") < 0.05, "{} m", error("structural-ba"));
 }
+
+#[test]
+fn a_start_that_nothing_joins_to_the_rest_is_placed_in_hindsight() {
+    // The first frames of this sphere share no landmark; later ones see what the first one saw.
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    done(at, &["simulate", "sphere2", "-o", "sphere"]);
+    done(at, &["measure", "sphere", "--noise", "none", "-o", "measured"]);
+    done(at, &["track", "measured", "-o", "tracked"]);
+    done(at, &["graph", "tracked", "-o", "graph"]);
+    done(at, &["adjust", "graph", "--method", "structural", "-o", "adjusted"]);
+    let sequence = format::read(at.join("adjusted").as_path()).unwrap();
+    let truth = truth(&sequence);
+    for name in ["map-to-frame", "structural-ba"] {
+        let estimate = Estimate::of(&sequence, name).unwrap();
+        let found = absolute(&truth, &poses(&estimate), Alignment::NONE).unwrap();
+        // Metres; without alignment: the first true pose holds, though the map was not begun there.
+        assert!(found.translation.rmse() < 1e-9, "{name}: {:e} m", found.translation.rmse());
+        assert_eq!(found.ids.len(), 100, "{name}");
+    }
+}
+
+#[test]
+fn what_is_dear_to_somebody_is_not_replaced() {
+    let folder = Folder::new();
+    let at = folder.path();
+    done(at, &["measure", "walk", "--noise", "first-release", "-o", "measured"]);
+    let track = |output: &str| os(at, &["track", "measured", "-o", output, "--force"]);
+    fs::create_dir_all(at.join("dear/walk")).unwrap();
+    fs::write(at.join("dear/thesis.txt"), "years").unwrap();
+    fs::write(at.join("letter"), "love").unwrap();
+    fs::create_dir(at.join("folder.mcap")).unwrap();
+    for (output, found) in [
+        ("dear", "`"),
+        ("letter", "found a file"),
+        ("folder.mcap", "found a folder"),
+        ("/dev/null", "found a device"),
+        ("measured/inner", "lies in the input"),
+    ] {
+        let (code, words) = track(output);
+        assert_eq!(code, Some(1), "{output}: {words}");
+        assert!(words.contains(output) && words.contains(found), "{output}: {words}");
+    }
+    assert_eq!(fs::read_to_string(at.join("dear/thesis.txt")).unwrap(), "years");
+    assert_eq!(fs::read_to_string(at.join("letter")).unwrap(), "love");
+    // What may be replaced: a sequence, and an empty folder.
+    fs::create_dir(at.join("empty")).unwrap();
+    done(at, &["track", "measured", "-o", "empty", "--force"]);
+    done(at, &["track", "measured", "-o", "empty", "--force"]);
+    let (code, words) = os(at, &["evaluate", "empty", "--per-frame", "empty/frames.parquet", "--force"]);
+    assert_eq!(code, Some(1), "{words}");
+    assert!(words.contains("lies in one"), "{words}");
+    done(at, &["validate", "empty"]);
+}
+
+#[test]
+fn values_out_of_range_are_misuse() {
+    let folder = tempfile::tempdir().unwrap();
+    for (command, option, value) in [
+        ("adjust", "--threads", "0"),
+        ("adjust", "--threads", "100000"),
+        ("adjust", "--min-views", "0"),
+        ("adjust", "--tolerance", "nan"),
+        ("adjust", "--sigma-px", "0"),
+        ("adjust", "--soft", "0"),
+        ("benchmark", "--threads", "100000"),
+        ("graph", "--min-views", "0"),
+    ] {
+        let (code, words) = os(folder.path(), &[command, "none", "-o", "out", option, value]);
+        assert_eq!(code, Some(2), "{command} {option}: {words}");
+        assert!(words.contains(option) && words.contains("expected"), "{words}");
+    }
+}

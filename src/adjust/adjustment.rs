@@ -80,6 +80,7 @@ pub fn adjust_watched(
         steps.extend(minimum.steps);
         summary.final_cost = minimum.final_cost;
         summary.ending = minimum.ending;
+        summary.plan = minimum.plan;
         estimation.read(&mut observations);
         let mut again = observations.drop_behind(&mut summary);
         if round == 0 && is_structural {

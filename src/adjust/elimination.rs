@@ -2,6 +2,8 @@
 
 use super::block_pattern::{BlockPattern, Ordering};
 use super::error::Error;
+use super::minimise::SolverOptions;
+use super::plan::{Choice, Eliminate, Factorisation, Plan};
 use super::problem::Problem;
 use super::reduced_system::ReducedSystem;
 
@@ -10,6 +12,12 @@ const MOST_PAIRS: f64 = 2e8;
 
 /// How many times slower the multiplications of small blocks run than those of a factorisation.
 const SMALL_BLOCKS: f64 = 6.0;
+
+/// How many times slower those of a sparse factorisation run than those of a dense one.
+const SPARSE: f64 = 2.5;
+
+/// Unknowns up to which a system is always dense.
+const ALWAYS_DENSE: usize = 200;
 
 /// Where a variable stands in the normal equations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -97,22 +105,37 @@ struct Candidate {
     pattern: BlockPattern,
     blocks: Vec<usize>,
     ordering: Ordering,
-    cost: f64,
+    choice: Choice,
 }
 
 impl Elimination {
     /// Chooses what to eliminate, and makes the reduced system for it.
-    pub(super) fn new(problem: &Problem) -> Result<(Self, ReducedSystem), Error> {
+    ///
+    /// # Errors
+    /// [`Error::TooLarge`], and [`Error::Elimination`] where what the options ask for cannot go first.
+    pub(super) fn new(
+        problem: &Problem,
+        options: &SolverOptions,
+    ) -> Result<(Self, ReducedSystem, Plan), Error> {
         let mut best: Option<Candidate> = None;
-        let choices = choices(problem);
+        let mut plan = Plan::default();
+        let mut choices = choices(problem);
+        if options.eliminate != Eliminate::Cheapest {
+            choices.retain(|choice| kind_of(problem, choice) == options.eliminate);
+            if choices.is_empty() {
+                return Err(Error::Elimination { asked: options.eliminate.name() });
+            }
+        }
         let pairs: Vec<f64> = choices.iter().map(|choice| pairs(problem, choice)).collect();
         let fewest = pairs.iter().copied().fold(f64::INFINITY, f64::min);
         for (choice, pairs) in choices.into_iter().zip(pairs) {
             if pairs > MOST_PAIRS && pairs > fewest {
                 continue;
             }
-            let Some(candidate) = Candidate::of(problem, choice) else { continue };
-            if best.as_ref().is_none_or(|best| candidate.cost < best.cost) {
+            let Some(candidate) = Candidate::of(problem, choice, options.factorisation) else { continue };
+            plan.choices.push(candidate.choice.clone());
+            if best.as_ref().is_none_or(|best| candidate.choice.cost() < best.choice.cost()) {
+                plan.taken = plan.choices.len() - 1;
                 best = Some(candidate);
             }
         }
@@ -120,8 +143,9 @@ impl Elimination {
         let blocks: Vec<usize> = best.ordering.order.iter().map(|block| best.blocks[*block]).collect();
         let sizes: Vec<usize> = blocks.iter().map(|variable| freedom(problem, *variable)).collect();
         let pattern = best.pattern.reordered(&best.ordering.order);
-        let system = ReducedSystem::new(pattern, &sizes, best.ordering.sparse)?;
-        Ok((Self::of(problem, &best.eliminate, blocks, sizes), system))
+        let is_dense = best.choice.factorisation == Factorisation::Dense;
+        let system = ReducedSystem::new(pattern, &sizes, is_dense)?;
+        Ok((Self::of(problem, &best.eliminate, blocks, sizes), system, plan))
     }
 
     fn of(problem: &Problem, eliminate: &[bool], reduced: Vec<usize>, reduced_sizes: Vec<usize>) -> Self {
@@ -294,8 +318,19 @@ fn pairs(problem: &Problem, eliminate: &[bool]) -> f64 {
     factors.iter().zip(eliminate).map(count).sum::<f64>() / 2.0
 }
 
+/// What a choice is called.
+fn kind_of(problem: &Problem, eliminate: &[bool]) -> Eliminate {
+    let is_pose = |variable: usize| problem.spaces[problem.space_of[variable] as usize].is_pose();
+    let mut chosen = (0..problem.len()).filter(|variable| eliminate[*variable]).peekable();
+    match chosen.peek().copied() {
+        None => Eliminate::Nothing,
+        Some(_) if chosen.any(is_pose) => Eliminate::Poses,
+        Some(_) => Eliminate::Landmarks,
+    }
+}
+
 impl Candidate {
-    fn of(problem: &Problem, eliminate: Vec<bool>) -> Option<Self> {
+    fn of(problem: &Problem, eliminate: Vec<bool>, factorisation: Factorisation) -> Option<Self> {
         let blocks: Vec<usize> = (0..problem.len()).filter(|v| !eliminate[*v] && !problem.held[*v]).collect();
         let mut block_of = vec![usize::MAX; problem.len()];
         blocks.iter().enumerate().for_each(|(at, v)| block_of[*v] = at);
@@ -347,12 +382,20 @@ impl Candidate {
         });
         let ordering = pattern.ordering(&sizes)?;
         let rows: usize = sizes.iter().sum();
-        let factorisation = if ReducedSystem::is_dense(rows, ordering.sparse) {
-            (rows as f64).powi(3) / 6.0
-        } else {
-            2.5 * ordering.sparse
+        let [dense, sparse] = [(rows as f64).powi(3) / 6.0, SPARSE * ordering.sparse];
+        let is_dense = match factorisation {
+            Factorisation::Cheapest => rows <= ALWAYS_DENSE || dense < sparse,
+            Factorisation::Dense => true,
+            Factorisation::Sparse => false,
         };
-        let cost = factorisation + SMALL_BLOCKS * small;
-        Some(Self { eliminate, pattern, blocks, ordering, cost })
+        let choice = Choice {
+            eliminate: kind_of(problem, &eliminate),
+            eliminated: (0..problem.len()).filter(|v| eliminate[*v] && !problem.held[*v]).count(),
+            reduced: rows,
+            factorisation: if is_dense { Factorisation::Dense } else { Factorisation::Sparse },
+            elimination_cost: SMALL_BLOCKS * small,
+            factorisation_cost: if is_dense { dense } else { sparse },
+        };
+        Some(Self { eliminate, pattern, blocks, ordering, choice })
     }
 }

@@ -66,6 +66,12 @@ pub enum Error {
     /// The information matrix is singular: something is left open by gauge and measurements.
     #[error("information matrix: expected a positive one, found it singular; is the gauge held?")]
     Singular,
+    /// What the options ask to eliminate first cannot be: some of it meets in a factor, or there is none.
+    #[error("cannot eliminate {asked} first: expected variables of which no two share a factor")]
+    Elimination {
+        /// What was asked for.
+        asked: &'static str,
+    },
     /// The problem is larger than what fits into memory.
     #[error("reduced system: expected at most {most} unknowns, found {found}")]
     TooLarge {

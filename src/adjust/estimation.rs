@@ -373,7 +373,14 @@ impl Estimation {
         summary.residual_rms = self.residual_rms();
         let mut covariances = if options.covariance {
             self.hold_scale(observations)?;
-            self.covariances(observations)?
+            // The estimate is worth keeping also where something is left open.
+            self.covariances(observations).or_else(|cause| match cause {
+                Error::Singular => {
+                    summary.no_covariance = Some(cause);
+                    Ok(Covariances::default())
+                }
+                cause => Err(cause),
+            })?
         } else {
             Covariances::default()
         };

@@ -2,6 +2,7 @@
 
 use super::error::Error;
 use super::normal_equations::NormalEquations;
+use super::plan::{Eliminate, Factorisation, Plan};
 use super::problem::{Problem, Variable};
 
 /// How steps are kept within the trusted region.
@@ -32,6 +33,10 @@ pub struct SolverOptions {
     pub cost_tolerance: f64,
     /// Damping at the start, relative to the diagonal.
     pub damping: f64,
+    /// What is eliminated before the rest is factorised.
+    pub eliminate: Eliminate,
+    /// How the rest is factorised.
+    pub factorisation: Factorisation,
 }
 
 impl Default for SolverOptions {
@@ -44,6 +49,8 @@ impl Default for SolverOptions {
             step_tolerance: 1e-9,
             cost_tolerance: 1e-25,
             damping: 1e-4,
+            eliminate: Eliminate::default(),
+            factorisation: Factorisation::default(),
         }
     }
 }
@@ -115,6 +122,8 @@ pub struct Minimum {
     pub final_cost: f64,
     /// Every step that was tried; the first entry is the start.
     pub steps: Vec<Step>,
+    /// How the steps were solved for.
+    pub plan: Plan,
 }
 
 /// Damping is kept above this, so that what the measurements leave open (a free scale) stays where it is.
@@ -146,12 +155,13 @@ pub fn minimise_watched(
     watch: &mut dyn FnMut(&Step) -> bool,
 ) -> Result<Minimum, Error> {
     options.check()?;
-    let mut equations = NormalEquations::new(problem)?;
+    let mut equations = NormalEquations::new(problem, options)?;
     let mut cost = equations.linearise(problem);
     if !cost.is_finite() {
         return Err(Error::Start { found: cost });
     }
-    let mut minimum = Minimum { initial_cost: cost, final_cost: cost, ..Minimum::default() };
+    let plan = equations.plan.clone();
+    let mut minimum = Minimum { initial_cost: cost, final_cost: cost, plan, ..Minimum::default() };
     minimum.steps.push(Step {
         cost,
         gradient_max: equations.gradient_max(),

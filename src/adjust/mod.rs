@@ -21,6 +21,7 @@ mod observations;
 mod options;
 mod parallax_point;
 mod parametrisation;
+mod plan;
 mod point_factor;
 mod point_handle;
 mod point_sight;
@@ -43,6 +44,7 @@ pub use options::{LineKind, Method, Options, Parallelism, PointForm, PosePrior};
 pub use parametrisation::{
     DirectionSpace, LineSpace, MOST_FREEDOM, Parametrisation, PoseSpace, RotationSpace, VectorSpace,
 };
+pub use plan::{Choice, Eliminate, Factorisation, Plan};
 pub use problem::{Problem, Values, Variable};
 pub use summary::{Reason, ReleasedLine, Summary, Tally};
 

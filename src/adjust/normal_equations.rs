@@ -2,6 +2,8 @@
 
 use super::elimination::{Elimination, Incidence, Pair, Place};
 use super::error::Error;
+use super::minimise::SolverOptions;
+use super::plan::Plan;
 use super::problem::Problem;
 use super::reduced_system::ReducedSystem;
 #[cfg(test)]
@@ -19,6 +21,8 @@ const SCALES: [f64; 2] = [1e-6, 1e32];
 pub(super) struct NormalEquations {
     pub(super) structure: Elimination,
     pub(super) system: ReducedSystem,
+    /// How it was chosen.
+    pub(super) plan: Plan,
     /// First number of each variable's step among all: reduced blocks first, then eliminated ones.
     step_start: Vec<usize>,
     residuals: Vec<f64>,
@@ -39,8 +43,8 @@ pub(super) struct NormalEquations {
 
 impl NormalEquations {
     /// Room for the normal equations of a problem.
-    pub(super) fn new(problem: &Problem) -> Result<Self, Error> {
-        let (structure, system) = Elimination::new(problem)?;
+    pub(super) fn new(problem: &Problem, options: &SolverOptions) -> Result<Self, Error> {
+        let (structure, system, plan) = Elimination::new(problem, options)?;
         let sizes = || structure.reduced_sizes.iter().chain(&structure.eliminated_sizes).copied();
         let (mut step_start, mut block_start) = (vec![0], vec![0]);
         for size in sizes() {
@@ -66,6 +70,7 @@ impl NormalEquations {
             column_starts,
             structure,
             system,
+            plan,
         })
     }
 

@@ -38,6 +38,11 @@ pub trait Parametrisation: Send + Sync {
     ///
     /// A step of zero must leave the variable as it is, and a Jacobian is the derivative by the step at zero.
     fn plus(&self, numbers: &[f64], step: &[f64], moved: &mut [f64]);
+
+    /// Whether its variables are poses, of which a problem may have many or few: see [`Eliminate`](super::Eliminate).
+    fn is_pose(&self) -> bool {
+        false
+    }
 }
 
 /// Numbers without constraint: points, inverse depths.
@@ -100,6 +105,9 @@ pub(super) fn rotation(numbers: &[f64]) -> Matrix3<f64> {
 }
 
 impl Parametrisation for PoseSpace {
+    fn is_pose(&self) -> bool {
+        true
+    }
     fn numbers(&self) -> usize {
         16
     }

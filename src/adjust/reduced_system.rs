@@ -10,6 +10,11 @@ use faer::sparse::linalg::cholesky::{
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
 use faer::{Conj, MatMut, MatRef, Par, Side};
+use std::num::NonZero;
+
+/// How work is cut for several cores: always the same way, so that results do not depend on how many there are.
+const PARALLEL: Par = Par::Rayon(PARTS);
+const PARTS: NonZero<usize> = NonZero::new(4).unwrap();
 
 /// Most unknowns of a dense system: 20000 squared are 3.2 GB.
 const MOST_DENSE: usize = 20_000;
@@ -41,19 +46,19 @@ struct Sparse {
 impl ReducedSystem {
     /// Makes room for a matrix of this pattern.
     ///
-    /// * `sizes` — rows of each block; `sparse` — multiplications of a sparse factorisation in this order.
-    pub(super) fn new(pattern: BlockPattern, sizes: &[usize], sparse: f64) -> Result<Self, Error> {
+    /// * `sizes` — rows of each block; `is_dense` — whether it is kept and factorised as a full matrix.
+    pub(super) fn new(pattern: BlockPattern, sizes: &[usize], is_dense: bool) -> Result<Self, Error> {
         let mut start = vec![0];
         for size in sizes {
             start.push(start[start.len() - 1] + size);
         }
         let rows = start[sizes.len()];
-        if Self::is_dense(rows, sparse) {
+        if is_dense {
             if rows > MOST_DENSE {
                 return Err(Error::TooLarge { most: MOST_DENSE, found: rows });
             }
             let request =
-                llt::factor::cholesky_in_place_scratch::<f64>(rows, Par::Seq, faer::Spec::default());
+                llt::factor::cholesky_in_place_scratch::<f64>(rows, PARALLEL, faer::Spec::default());
             let memory = MemBuffer::try_new(request).map_err(|_| too_large(rows))?;
             return Ok(Self {
                 start,
@@ -87,17 +92,12 @@ impl ReducedSystem {
         )
         .map_err(|_| too_large(rows))?;
         let request = symbolic
-            .factorize_numeric_llt_scratch::<f64>(Par::Seq, faer::Spec::default())
-            .or(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
+            .factorize_numeric_llt_scratch::<f64>(PARALLEL, faer::Spec::default())
+            .or(symbolic.solve_in_place_scratch::<f64>(1, PARALLEL));
         let memory = MemBuffer::try_new(request).map_err(|_| too_large(rows))?;
         let factor = vec![0.0; symbolic.len_val()];
         let storage = Storage::Sparse(Box::new(Sparse { matrix, symbolic, factor, memory }));
         Ok(Self { start, pattern, values, storage })
-    }
-
-    /// Whether a dense factorisation is the faster one: its multiplications run about three times as fast.
-    pub(super) fn is_dense(rows: usize, sparse: f64) -> bool {
-        rows <= 200 || (rows as f64).powi(3) / 6.0 < 2.5 * sparse
     }
 
     /// Rows of the matrix.
@@ -152,7 +152,7 @@ impl ReducedSystem {
                 let matrix = MatMut::from_column_major_slice_mut(&mut self.values, rows, rows);
                 let stack = MemStack::new(memory);
                 let regularisation = LltRegularization::default();
-                llt::factor::cholesky_in_place(matrix, regularisation, Par::Seq, stack, faer::Spec::default())
+                llt::factor::cholesky_in_place(matrix, regularisation, PARALLEL, stack, faer::Spec::default())
                     .is_ok()
             }
             Storage::Sparse(sparse) => {
@@ -168,7 +168,7 @@ impl ReducedSystem {
                         matrix,
                         Side::Lower,
                         regularisation,
-                        Par::Seq,
+                        PARALLEL,
                         stack,
                         faer::Spec::default(),
                     )
@@ -188,15 +188,15 @@ impl ReducedSystem {
         match &self.storage {
             Storage::Dense { .. } => {
                 let factor = MatRef::from_column_major_slice(&self.values, rows, rows);
-                let request = llt::solve::solve_in_place_scratch::<f64>(rows, columns, Par::Seq);
+                let request = llt::solve::solve_in_place_scratch::<f64>(rows, columns, PARALLEL);
                 let mut memory = MemBuffer::new(request);
-                llt::solve::solve_in_place(factor, sides, Par::Seq, MemStack::new(&mut memory));
+                llt::solve::solve_in_place(factor, sides, PARALLEL, MemStack::new(&mut memory));
             }
             Storage::Sparse(sparse) => {
-                let request = sparse.symbolic.solve_in_place_scratch::<f64>(columns, Par::Seq);
+                let request = sparse.symbolic.solve_in_place_scratch::<f64>(columns, PARALLEL);
                 let mut memory = MemBuffer::new(request);
                 let factor = LltRef::new(&sparse.symbolic, &sparse.factor);
-                factor.solve_in_place_with_conj(Conj::No, sides, Par::Seq, MemStack::new(&mut memory));
+                factor.solve_in_place_with_conj(Conj::No, sides, PARALLEL, MemStack::new(&mut memory));
             }
         }
     }

@@ -1,6 +1,8 @@
 //! How an adjustment went: what was used, what was left out and why, and how it ended.
 
+use super::error::Error;
 use super::minimise::Ending;
+use super::plan::Plan;
 use crate::structure::{FrameId, GroupId, LineId, PointId};
 use std::collections::BTreeMap;
 
@@ -100,6 +102,8 @@ pub struct Summary {
     pub residuals: usize,
     /// Degrees of freedom of all variables.
     pub unknowns: usize,
+    /// How steps were solved for, in the last round.
+    pub plan: Plan,
     /// Poses.
     pub poses: Tally,
     /// Points.
@@ -124,6 +128,8 @@ pub struct Summary {
     pub unconstrained: Vec<FrameId>,
     /// Points in front of all their cameras at the start that ended behind one.
     pub behind: Vec<PointId>,
+    /// Why there are no covariances, though they were asked for.
+    pub no_covariance: Option<Error>,
     /// Lines that share the direction of their group.
     pub grouped: usize,
     /// Lines that contradict their group.

@@ -173,7 +173,7 @@ fn the_normal_equations_are_solved_whatever_is_eliminated() {
     for (method, frames, points) in cases {
         let scene = Scene { frames, points, ..small() };
         let problem = estimation(&scene.graph(), &options(method)).problem;
-        let mut equations = NormalEquations::new(&problem).unwrap();
+        let mut equations = NormalEquations::new(&problem, &SolverOptions::default()).unwrap();
         equations.linearise(&problem);
         let damping = 1e-3;
         assert!(equations.factorise(damping));

@@ -1,6 +1,7 @@
 //! Covariances: parts of the inverse information, without all of it.
 
 use super::error::Error;
+use super::minimise::SolverOptions;
 use super::normal_equations::NormalEquations;
 use super::problem::{Problem, Variable};
 use nalgebra::DMatrix;
@@ -20,7 +21,7 @@ impl Uncertainty {
     /// # Errors
     /// [`Error::Start`] without a cost, [`Error::Singular`] where something is left open.
     pub(super) fn of(problem: &Problem) -> Result<Self, Error> {
-        let mut equations = NormalEquations::new(problem)?;
+        let mut equations = NormalEquations::new(problem, &SolverOptions::default())?;
         let cost = equations.linearise(problem);
         if !cost.is_finite() {
             return Err(Error::Start { found: cost });

@@ -34,14 +34,20 @@ pub(super) fn bounds(
     tell: &(dyn Fn(&Progress<'_>) + Sync),
 ) -> Result<(), Error> {
     let title = &sequence.manifest.name;
-    if store.bound(title)?.is_some() {
+    // What all measurements allow is shown whatever is run, and is the bound of estimates from elsewhere.
+    let mut methods = plan.methods.clone();
+    if !methods.contains(&Method::StructuralBa) {
+        methods.push(Method::StructuralBa);
+    }
+    let known = store.bound(title)?;
+    if known.is_some_and(|known| methods.iter().all(|method| known.contains_key(method.name()))) {
         return Ok(());
     }
     let seed = plan.seeds.first().copied().unwrap_or(0);
     let sequence = measured(sequence, &plan.noise, seed);
     let mut found = BTreeMap::new();
     let mut bounds: BTreeMap<Method, Option<Bound>> = BTreeMap::new();
-    for method in &plan.methods {
+    for method in &methods {
         // Trackers may use all that the structural adjustment uses.
         let basis = if method.is_adjustment() { *method } else { Method::StructuralBa };
         let bound = bounds.entry(basis).or_insert_with(|| match bound_of(&sequence, basis) {

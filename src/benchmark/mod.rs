@@ -5,6 +5,7 @@
 
 mod bound;
 mod cell;
+mod content;
 mod error;
 mod html;
 mod measured;

@@ -80,7 +80,9 @@ impl Results {
                     let key = CellKey { sequence: sequence.clone(), method: method.clone(), seed: *seed };
                     found.extend(store.cell(&key)?);
                 }
-                rows.push(row(sequence, &method, &found, bounds.get(&method)));
+                // Estimates from elsewhere may have used everything.
+                let bound = bounds.get(&method).or_else(|| bounds.get(Method::StructuralBa.name()));
+                rows.push(row(sequence, &method, &found, bound));
                 cells.extend(found);
             }
             all_bounds.insert(sequence.clone(), bounds);

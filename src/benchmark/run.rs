@@ -6,6 +6,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use super::bound::bounds;
+use super::content::Content;
 use super::{Cell, CellKey, CurvePoint, Error, Method, Outcome, Plan, Store, load, measured};
 use crate::adjust;
 use crate::covisibility::{GraphOptions, reprojection_graph};
@@ -23,6 +24,11 @@ pub enum Progress<'a> {
         sequence: &'a str,
         /// Why.
         reason: &'a str,
+    },
+    /// A sequence is not the one that stored cells were made of: they are made anew.
+    Changed {
+        /// Its name.
+        sequence: &'a str,
     },
     /// The bound of a method on a sequence cannot be computed.
     NoBound {
@@ -83,6 +89,9 @@ pub fn run(
             (0..=2, _) => "no true poses to compare with",
             (_, 0) => "no points",
             _ => {
+                if store.expect(&title, &Content::of(&sequence, &plan.estimates))? {
+                    tell(&Progress::Changed { sequence: &title });
+                }
                 kept.push(title);
                 cases.push(Case { sequence, truth });
                 continue;
@@ -90,7 +99,7 @@ pub fn run(
         };
         tell(&Progress::LeftOut { sequence: &title, reason });
     }
-    let bound = plan.bound && !plan.methods.is_empty();
+    let bound = plan.bound;
     let units: Vec<(&Case, Option<u64>)> = cases
         .iter()
         .flat_map(|case| {

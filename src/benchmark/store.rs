@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
+use super::content::Content;
 use super::{Bound, Cell, CellKey, Error, Plan};
 use crate::unfinished::Unfinished;
 
@@ -14,6 +15,7 @@ use crate::unfinished::Unfinished;
 const PLAN_FILE: &str = "plan.json";
 const CELLS: &str = "cells";
 const BOUNDS: &str = "bounds";
+const CONTENTS: &str = "contents";
 
 /// What a stored plan was made by.
 #[derive(Clone, Debug, PartialEq, Serialize, serde::Deserialize)]
@@ -57,7 +59,7 @@ impl Store {
             });
         }
         if begun && anew {
-            for part in [CELLS, BOUNDS] {
+            for part in [CELLS, BOUNDS, CONTENTS] {
                 let path = folder.join(part);
                 if path.is_dir() {
                     fs::remove_dir_all(&path).map_err(Error::io(&path))?;
@@ -93,6 +95,49 @@ impl Store {
 
     fn bound_file(&self, sequence: &str) -> PathBuf {
         self.folder.join(BOUNDS).join(format!("{}.json", file_name(sequence)))
+    }
+
+    /// Says what a sequence holds now; removes what was made of another content, and tells whether there was any.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Stored`].
+    pub(super) fn expect(&self, sequence: &str, content: &Content) -> Result<bool, Error> {
+        let name = file_name(sequence);
+        let path = self.folder.join(CONTENTS).join(format!("{name}.json"));
+        let mut stale = Vec::new();
+        let mut content = content.clone();
+        if path.exists() {
+            let stored: Content = read(&path)?;
+            if stored.measured == content.measured {
+                let other = |(estimate, digest): (&String, &String)| {
+                    stored.estimates.get(estimate).is_none_or(|stored| stored != digest)
+                };
+                let others: Vec<&String> =
+                    content.estimates.iter().filter(|each| other(*each)).map(|(name, _)| name).collect();
+                for method in others {
+                    let key = CellKey { sequence: sequence.to_owned(), method: method.clone(), seed: 0 };
+                    stale.push(self.cell_file(&key));
+                }
+                // Estimates that are not asked for today keep what was made of them.
+                let mut estimates = stored.estimates;
+                estimates.append(&mut content.estimates);
+                content.estimates = estimates;
+            } else {
+                stale.push(self.folder.join(CELLS).join(&name));
+                stale.push(self.bound_file(sequence));
+            }
+        } else {
+            // Nobody knows of what these were made.
+            stale.push(self.folder.join(CELLS).join(&name));
+            stale.push(self.bound_file(sequence));
+        }
+        stale.retain(|path| path.exists());
+        for path in &stale {
+            let removed = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
+            removed.map_err(Error::io(path))?;
+        }
+        write(&path, &content)?;
+        Ok(!stale.is_empty())
     }
 
     /// The cell of a key, where it is done.
@@ -154,8 +199,9 @@ fn file_name(name: &str) -> String {
 
 fn read<T: DeserializeOwned>(path: &Path) -> Result<T, Error> {
     let text = fs::read_to_string(path).map_err(Error::io(path))?;
+    let damaged = |cause| format!("{cause}; what it held is made anew once it is removed");
     serde_json::from_str(&text)
-        .map_err(|cause| Error::Stored { path: path.to_owned(), detail: cause.to_string() })
+        .map_err(|cause| Error::Stored { path: path.to_owned(), detail: damaged(cause) })
 }
 
 fn write<T: Serialize>(path: &Path, value: &T) -> Result<(), Error> {

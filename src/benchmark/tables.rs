@@ -277,7 +277,9 @@ pub fn markdown(results: &Results, label: &str) -> String {
             format!("{}{}", words(row), paper.unwrap_or_default())
         });
         let cells: Vec<String> = cells.collect();
-        let bound = results.row(sequence, Method::StructuralBa.name()).and_then(|row| row.bound_cm);
+        let bounds = results.bounds.get(sequence);
+        let bound = bounds.and_then(|bounds| bounds.get(Method::StructuralBa.name()));
+        let bound = bound.map(|bound| bound.translation_rms_m * 100.0);
         let bound = bound.map_or_else(|| "–".to_owned(), figures);
         text += &format!("| {sequence} | {} | {bound} |\n", cells.join(" | "));
     }

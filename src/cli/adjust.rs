@@ -8,10 +8,10 @@ use anyhow::Context;
 use serde_json::json;
 
 use super::progress::Progress;
-use super::{Outcome, extended, text};
+use super::{Outcome, extended, parsed, text};
 use crate::adjust::{
-    Adjusted, LineKind, Loss, Method, Optimiser, Options, Parallelism, PointForm, SolverOptions, Summary,
-    Tally, adjust_watched,
+    Adjusted, Eliminate, Factorisation, LineKind, Loss, Method, Optimiser, Options, Parallelism, PointForm,
+    SolverOptions, Summary, Tally, adjust_watched,
 };
 use crate::structure::{Estimate, FactorGraph, FrameId, Sequence};
 
@@ -32,8 +32,8 @@ const MOST_NAMES: usize = 8;
 Losses, in units of sigma: none, huber:1.345, cauchy:1, tukey:4.685, geman-mcclure:3
 
 Examples:
-  os adjust box1 -o adjusted.mcap --method point
-  os adjust tracked.mcap -o adjusted.mcap --method structural --covariance
+  os adjust graph.mcap -o adjusted.mcap --method structural --covariance
+  os adjust box1 -o adjusted.mcap --method point --replace
   os adjust box1 -o again/ --method point-line --lines endpoints --loss huber:2 --name endpoints")]
 #[expect(clippy::struct_excessive_bools, reason = "each is a flag of the command line")]
 pub(super) struct Args {
@@ -67,20 +67,20 @@ pub(super) struct Args {
     #[arg(long, value_name = "N")]
     max_iterations: Option<usize>,
     /// Stop when a step lowers the cost by less than this part of it.
-    #[arg(long, value_name = "F")]
+    #[arg(long, value_name = "F", value_parser = parsed::not_negative)]
     tolerance: Option<f64>,
     /// Leave out landmarks that fewer frames see.
-    #[arg(long, value_name = "N", default_value_t = 3)]
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = parsed::at_least_one)]
     min_views: usize,
     /// Hold the pose of this frame; may be given several times.
     #[arg(long, value_name = "FRAME")]
     fix: Vec<i64>,
     /// Standard deviation of pixel coordinates, in place of the declared one.
-    #[arg(long, value_name = "PX")]
+    #[arg(long, value_name = "PX", value_parser = parsed::positive)]
     sigma_px: Option<f64>,
     /// Draw parallel lines to the direction of their group, by this many degrees of standard deviation, in place of one direction for
     /// all (structural).
-    #[arg(long, value_name = "DEGREES", num_args = 0..=1, default_missing_value = "0.5")]
+    #[arg(long, value_name = "DEGREES", num_args = 0..=1, default_missing_value = "0.5", value_parser = parsed::positive)]
     soft: Option<f64>,
     /// Make no use of structural groups (structural).
     #[arg(long, conflicts_with = "soft")]
@@ -88,6 +88,15 @@ pub(super) struct Args {
     /// Let frames that see too little go where noise carries them, in place of moving as they did at the start (structural).
     #[arg(long)]
     no_motion: bool,
+    /// What the solver eliminates first [default: whatever costs least].
+    #[arg(long, value_enum, value_name = "WHAT")]
+    eliminate: Option<EliminateName>,
+    /// How the solver factorises the rest [default: whatever costs least].
+    #[arg(long, value_enum, value_name = "HOW")]
+    factorise: Option<FactoriseName>,
+    /// Say how the solver goes about it, with the cost of the other ways.
+    #[arg(long)]
+    explain: bool,
     /// Store covariances of poses and landmarks.
     #[arg(long)]
     covariance: bool,
@@ -101,7 +110,7 @@ pub(super) struct Args {
     #[arg(long)]
     json: bool,
     /// Threads [default: one for each core].
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = parsed::threads)]
     threads: Option<usize>,
 }
 
@@ -135,7 +144,39 @@ enum OptimiserName {
     Dogleg,
 }
 
+#[derive(clap::ValueEnum, Clone, Copy, Debug)]
+enum EliminateName {
+    /// Points and lines.
+    Landmarks,
+    /// Poses.
+    Poses,
+    /// Nothing: all unknowns at once.
+    Nothing,
+}
+
+#[derive(clap::ValueEnum, Clone, Copy, Debug)]
+enum FactoriseName {
+    /// As a full matrix.
+    Dense,
+    /// By its non-zero parts.
+    Sparse,
+}
+
 impl Args {
+    /// Refuses options that the method has no use for: who gives them expects something of them.
+    fn refuse_idle(&self) -> anyhow::Result<()> {
+        let of_structural = [
+            ("--soft", self.soft.is_some()),
+            ("--no-groups", self.no_groups),
+            ("--no-motion", self.no_motion),
+        ];
+        let idle = of_structural.into_iter().find(|(_, given)| *given);
+        if let Some((option, _)) = idle.filter(|_| !matches!(self.method, MethodName::Structural)) {
+            anyhow::bail!("{option} goes with --method structural");
+        }
+        Ok(())
+    }
+
     fn options(&self) -> Options {
         let method = match self.method {
             MethodName::Point => Method::Point,
@@ -151,6 +192,17 @@ impl Args {
             },
             max_iterations: self.max_iterations.unwrap_or(usual.solver.max_iterations),
             function_tolerance: self.tolerance.unwrap_or(usual.solver.function_tolerance),
+            eliminate: match self.eliminate {
+                Some(EliminateName::Landmarks) => Eliminate::Landmarks,
+                Some(EliminateName::Poses) => Eliminate::Poses,
+                Some(EliminateName::Nothing) => Eliminate::Nothing,
+                None => Eliminate::Cheapest,
+            },
+            factorisation: match self.factorise {
+                Some(FactoriseName::Dense) => Factorisation::Dense,
+                Some(FactoriseName::Sparse) => Factorisation::Sparse,
+                None => Factorisation::Cheapest,
+            },
             ..usual.solver
         };
         Options {
@@ -183,7 +235,8 @@ impl Args {
 }
 
 pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome> {
-    let (mut sequence, outcome) = extended::read(&args.sequence, &args.output, args.force)?;
+    args.refuse_idle()?;
+    let (mut sequence, mut outcome) = extended::read(&args.sequence, &args.output, args.force)?;
     let options = args.options();
     let name = options.estimate_name().to_owned();
     extended::check_name("an estimate", &name, Estimate::is_in(&sequence, &name), args.replace)?;
@@ -193,6 +246,16 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     }
     let adjusted = adjust_on_threads(&graph, &options, args.threads)?;
     let Adjusted { estimate, summary } = adjusted;
+    if args.explain {
+        write!(io::stderr(), "{}", summary.plan)?;
+    }
+    if !summary.ending.has_converged() {
+        outcome = Outcome::Findings;
+    }
+    if let Some(cause) = &summary.no_covariance {
+        writeln!(io::stderr(), "warning: no covariances: {cause}")?;
+        outcome = Outcome::Findings;
+    }
     estimate.put(&mut sequence);
     sequence.sort();
     let size = extended::write(&args.output, sequence, args.force)?;
@@ -216,7 +279,7 @@ fn pick(name: Option<&str>, sequence: &Sequence) -> anyhow::Result<FactorGraph> 
     }
     let usual = ["initial", "map-to-frame", "frame-to-frame"];
     let picked = match names.len() {
-        0 => anyhow::bail!("the sequence has no factor graph; `os track` makes one"),
+        0 => anyhow::bail!("the sequence has no factor graph; `os graph` makes one of an estimate"),
         1 => names.first().map(String::as_str),
         _ => usual.into_iter().find(|name| names.contains(*name)),
     };

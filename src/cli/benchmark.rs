@@ -8,7 +8,7 @@ use anyhow::Context;
 use clap::builder::PossibleValuesParser;
 
 use super::progress::Progress;
-use super::{Outcome, text};
+use super::{Outcome, parsed, text};
 use crate::benchmark::{
     self, Method, Plan, Results, Store, cells_table, curves_table, html, markdown, summary_table,
 };
@@ -68,7 +68,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "TEXT", default_value = "")]
     label: String,
     /// Threads; all cores by default. Figures do not depend on it.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = parsed::threads)]
     threads: Option<usize>,
     /// Begin anew: remove the cells that are there, whatever made them.
     #[arg(long)]
@@ -123,6 +123,12 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         benchmark::Progress::Done { done, total } => progress.update(*done, *total),
         benchmark::Progress::NoBound { sequence, method, reason } => {
             let _ = writeln!(io::stderr(), "warning: {sequence}: no bound for {method}: {reason}");
+        }
+        benchmark::Progress::Changed { sequence } => {
+            let _ = writeln!(
+                io::stderr(),
+                "{sequence}: is another than its cells were made of; they are made anew"
+            );
         }
         benchmark::Progress::LeftOut { sequence, reason } => {
             left_out.store(true, std::sync::atomic::Ordering::Relaxed);

@@ -160,6 +160,8 @@ pub(super) struct Compared {
 
 pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome> {
     let options = args.options()?;
+    args.output.refuse_inputs(&args.sequences)?;
+    args.output.refuse_inputs(&args.files)?;
     let compared: Vec<Compared> = if args.files.is_empty() {
         let sequences = args.sequences.iter();
         sequences.map(|path| sequence(args, path, &options)).collect::<Result<_, _>>()?

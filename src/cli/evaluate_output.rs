@@ -35,6 +35,24 @@ pub(super) struct OutputArgs {
 }
 
 impl OutputArgs {
+    /// Refuses outputs that are an input, or lie in one.
+    pub(super) fn refuse_inputs(&self, inputs: &[PathBuf]) -> anyhow::Result<()> {
+        let outputs = [&self.per_frame, &self.save_plot, &self.save_results, &self.save_relative_results];
+        for output in outputs.into_iter().flatten() {
+            let folder = output.parent().filter(|folder| !folder.as_os_str().is_empty());
+            let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok();
+            let place = folder.zip(output.file_name()).map(|(folder, name)| folder.join(name));
+            let taken = |input: &PathBuf| {
+                let input = input.canonicalize().ok();
+                input.zip(place.as_ref()).is_some_and(|(input, place)| place.starts_with(input))
+            };
+            if inputs.iter().any(taken) {
+                anyhow::bail!("{}: is an input itself, or lies in one", output.display());
+            }
+        }
+        Ok(())
+    }
+
     /// Writes what was asked for.
     ///
     /// * `relation` — that of the archives; translation where none was named.
@@ -76,7 +94,7 @@ impl OutputArgs {
     }
 
     fn save(&self, path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
-        let partial = Partial::new(path, self.force)?;
+        let partial = Partial::file(path, self.force)?;
         fs::write(partial.path(), bytes).with_context(|| path.display().to_string())?;
         Ok(partial.finish()?)
     }

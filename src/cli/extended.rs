@@ -8,10 +8,18 @@ use super::{Outcome, left_behind, text};
 use crate::format::{self, WriteOptions};
 use crate::structure::{Sequence, registry};
 
+/// What the true poses are called where an estimate may be named.
+const TRUTH: &str = "truth";
+
 /// A whole sequence that is to be extended, and whether something of it will be left behind.
 ///
 /// Refuses an output that could not be written in the end, before any work.
 pub(super) fn read(input: &Path, output: &Path, force: bool) -> anyhow::Result<(Sequence, Outcome)> {
+    if let Some(folder) = output.parent().and_then(|folder| folder.canonicalize().ok())
+        && input.canonicalize().is_ok_and(|input| input.is_dir() && folder.starts_with(input))
+    {
+        anyhow::bail!("{}: lies in the input", output.display());
+    }
     if output.symlink_metadata().is_ok() {
         let (input, output_found) = (input.canonicalize().ok(), output.canonicalize().ok());
         if input.zip(output_found).is_some_and(|(input, output)| input.starts_with(&output)) {
@@ -38,6 +46,7 @@ pub(super) fn write(output: &Path, mut sequence: Sequence, force: bool) -> anyho
 /// Refuses a name that is taken already, unless it is to be replaced.
 pub(super) fn check_name(kind: &str, name: &str, is_taken: bool, replace: bool) -> anyhow::Result<()> {
     anyhow::ensure!(!name.is_empty(), "an empty name is no name of {kind}");
+    anyhow::ensure!(name != TRUTH, "`{TRUTH}` is no name of {kind}: it stands for the true poses");
     anyhow::ensure!(
         !is_taken || replace,
         "the sequence has {kind} `{name}` already: choose another name with --name, or replace it with --replace"

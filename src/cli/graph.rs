@@ -8,7 +8,7 @@ use anyhow::Context;
 use clap::ValueEnum;
 use serde_json::json;
 
-use super::{Outcome, extended, text};
+use super::{Outcome, extended, parsed, text};
 use crate::covisibility::{self, GraphOptions, KeyFrameRule, LoopRule};
 use crate::structure::{Estimate, FactorGraph, MeasuredFrame, MeasurementNoise, Sequence, registry};
 
@@ -46,7 +46,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
     /// Frames that have to see a landmark for it to be a vertex.
-    #[arg(long, value_name = "N", default_value_t = 2)]
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = parsed::at_least_one)]
     min_views: usize,
     /// Take key frames alone: frames that share less than --most-shared with the one before.
     #[arg(long)]
@@ -58,7 +58,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "N", default_value_t = KeyFrameRule::default().longest_gap, requires = "key_frames")]
     longest_gap: usize,
     /// Frames for which a landmark was not seen before it closes a loop.
-    #[arg(long, value_name = "N", default_value_t = LoopRule::default().gap)]
+    #[arg(long, value_name = "N", default_value_t = LoopRule::default().gap, value_parser = parsed::at_least_one)]
     loop_gap: usize,
     /// Landmarks that have to return for a loop to be closed.
     #[arg(long, value_name = "N", default_value_t = LoopRule::default().least_shared)]
@@ -124,6 +124,14 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
                 "landmarks_with_few_views": found.landmarks_with_few_views,
                 "measurements_not_finite": found.measurements_not_finite,
             });
+            if found.point_factors + found.line_factors == 0 {
+                anyhow::bail!(
+                    "the graph of `{}` would be empty: none of its landmarks is seen in {} frames or more ({} landmarks that were measured are not in its map)",
+                    estimate.name,
+                    args.min_views,
+                    text::count(found.landmarks_not_in_map as u64)
+                );
+            }
             (graph, said, words)
         }
         Kind::PoseGraph => {

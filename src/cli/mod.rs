@@ -23,6 +23,7 @@ mod info;
 mod left_behind;
 mod man;
 mod measure;
+mod parsed;
 mod plot;
 mod progress;
 mod render;

@@ -30,6 +30,16 @@ pub enum Error {
         /// The path.
         path: PathBuf,
     },
+    /// What is there is not of the kind that would take its place, and so may be dear to somebody.
+    #[error("{}: expected {expected} to replace, found {found}; use another name", path.display())]
+    NotReplaced {
+        /// The path.
+        path: PathBuf,
+        /// What may be replaced.
+        expected: &'static str,
+        /// What is there.
+        found: String,
+    },
     /// The manifest cannot be understood.
     #[error("{}: manifest: {detail}", path.display())]
     Manifest {

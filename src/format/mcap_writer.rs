@@ -45,7 +45,7 @@ impl McapWriter {
         first_stamp: u64,
         force: bool,
     ) -> Result<Self, Error> {
-        let partial = Partial::new(path, force)?;
+        let partial = Partial::file(path, force)?;
         let file = BufWriter::new(partial.create_file()?);
         // One compressing thread, so that the bytes do not depend on the machine.
         let options = McapOptions::new()

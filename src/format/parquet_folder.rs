@@ -11,7 +11,7 @@ use super::croissant::croissant;
 use super::parquet_writer::ParquetTableWriter;
 use super::partial::Partial;
 use super::{Error, names};
-use crate::structure::{Manifest, TableInfo};
+use crate::structure::{Manifest, TableInfo, table_info};
 
 /// Writes the tables of a sequence side by side.
 pub(super) struct ParquetFolderWriter {
@@ -23,7 +23,12 @@ pub(super) struct ParquetFolderWriter {
 impl ParquetFolderWriter {
     /// Begins a folder.
     pub(super) fn create(path: &Path, manifest: &Manifest, force: bool) -> Result<Self, Error> {
-        let partial = Partial::new(path, force)?;
+        let is_member = |name: &str| {
+            let table = name.strip_suffix(".parquet");
+            [names::MANIFEST_FILE, names::CROISSANT_FILE].contains(&name)
+                || table.is_some_and(|name| table_info(name).is_some())
+        };
+        let partial = Partial::folder(path, force, is_member)?;
         partial.create_folder()?;
         let json = |value: serde_json::Result<String>| {
             value.map_err(|error| Error::Manifest { path: path.to_owned(), detail: error.to_string() })

@@ -16,12 +16,50 @@ pub(crate) struct Partial {
 }
 
 impl Partial {
-    /// Reserves the place; refuses when something stands there and `force` is not given.
+    /// Reserves the place; refuses when something stands there and `force` is not given, and always what is neither file nor folder.
     pub(crate) fn new(target: &Path, force: bool) -> Result<Self, Error> {
         if !force && target.symlink_metadata().is_ok() {
             return Err(Error::Exists { path: target.to_owned() });
         }
+        if target.metadata().is_ok_and(|found| !found.is_file() && !found.is_dir()) {
+            return Err(not_replaced(target, "a file or a folder", "a device or the like"));
+        }
         Ok(Self { unfinished: Unfinished::beside(target).map_err(Error::io(target))?, force })
+    }
+
+    /// As [`Partial::new`], for a file: refuses a folder.
+    pub(crate) fn file(target: &Path, force: bool) -> Result<Self, Error> {
+        let partial = Self::new(target, force)?;
+        if target.is_dir() {
+            return Err(not_replaced(target, "a file", "a folder"));
+        }
+        Ok(partial)
+    }
+
+    /// As [`Partial::new`], for a folder: refuses a file, and a folder with anything in it that is not such an output's own.
+    pub(crate) fn folder(
+        target: &Path,
+        force: bool,
+        is_member: impl Fn(&str) -> bool,
+    ) -> Result<Self, Error> {
+        let partial = Self::new(target, force)?;
+        if target.is_file() {
+            return Err(not_replaced(target, "a folder", "a file"));
+        }
+        if target.is_dir() {
+            for entry in target.read_dir().map_err(Error::io(target))? {
+                let name = entry.map_err(Error::io(target))?.file_name();
+                let name = name.to_string_lossy();
+                if !is_member(&name) {
+                    return Err(not_replaced(
+                        target,
+                        "a folder with nothing else in it",
+                        &format!("`{name}` in it"),
+                    ));
+                }
+            }
+        }
+        Ok(partial)
     }
 
     /// The temporary name.
@@ -47,4 +85,8 @@ impl Partial {
         }
         self.unfinished.finish().map_err(Error::io(&target))
     }
+}
+
+fn not_replaced(path: &Path, expected: &'static str, found: &str) -> Error {
+    Error::NotReplaced { path: path.to_owned(), expected, found: found.to_owned() }
 }

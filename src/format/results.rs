@@ -38,7 +38,7 @@ pub fn write_results(path: &Path, table: &ResultTable, force: bool) -> Result<()
     let arrays = table.columns.iter().map(|column| array(&column.values)).collect();
     let batch =
         RecordBatch::try_new(Arc::clone(&schema), arrays).map_err(|cause| container(cause.to_string()))?;
-    let partial = Partial::new(path, force)?;
+    let partial = Partial::file(path, force)?;
     let mut bytes = Vec::new();
     let properties = WriterProperties::builder()
         .set_created_by(format!("open-structure {}", env!("CARGO_PKG_VERSION")))
@@ -58,7 +58,7 @@ pub fn write_results(path: &Path, table: &ResultTable, force: bool) -> Result<()
 /// # Errors
 /// [`Error::Exists`] when something is there and `force` is not given, and [`Error::Io`].
 pub fn write_text(path: &Path, text: &str, force: bool) -> Result<(), Error> {
-    let partial = Partial::new(path, force)?;
+    let partial = Partial::file(path, force)?;
     partial.create_file()?.write_all(text.as_bytes()).map_err(Error::io(partial.path()))?;
     partial.finish()
 }

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Matrix6, Vector6};
 
 use super::alignment::{Alignment, Matches};
+use super::hindsight::Hindsight;
 use super::line_landmark::{LineLandmark, PendingLine};
 use super::motion::Motion;
 use super::options::Setting;
@@ -42,8 +43,8 @@ pub(super) struct LandmarkTracker {
     setting: Setting,
     memory: Memory,
     motion: Motion,
-    points: BTreeMap<PointId, PointLandmark>,
-    lines: BTreeMap<LineId, LineLandmark>,
+    pub(super) points: BTreeMap<PointId, PointLandmark>,
+    pub(super) lines: BTreeMap<LineId, LineLandmark>,
     pending_points: BTreeMap<PointId, PendingPoint>,
     pending_lines: BTreeMap<LineId, PendingLine>,
     /// Landmarks that are no longer tracked against, as last seen.
@@ -58,11 +59,13 @@ pub(super) struct LandmarkTracker {
     /// Frames that wait for a first map.
     start: TwoViewStart,
     /// What is known by now of frames that waited.
-    revised: Vec<(FrameId, FrameTrack)>,
+    pub(super) revised: Vec<(FrameId, FrameTrack)>,
+    /// Frames to look at again in the end, against the whole map.
+    pub(super) hindsight: Hindsight,
 }
 
 /// What was measured in a frame, and what is known of it.
-struct Seen<'a> {
+pub(super) struct Seen<'a> {
     points: &'a [PointSighting],
     lines: &'a [LineSighting],
     /// Places in `points` and `lines` of what is matched.
@@ -71,7 +74,7 @@ struct Seen<'a> {
 }
 
 impl<'a> Seen<'a> {
-    fn new(points: &'a [PointSighting], lines: &'a [LineSighting]) -> Self {
+    pub(super) fn new(points: &'a [PointSighting], lines: &'a [LineSighting]) -> Self {
         Self { points, lines, point_places: Vec::new(), line_places: Vec::new() }
     }
 }
@@ -93,6 +96,7 @@ impl LandmarkTracker {
             ever_tracked: false,
             start: TwoViewStart::default(),
             revised: Vec::new(),
+            hindsight: Hindsight::default(),
         }
     }
 
@@ -290,10 +294,15 @@ impl LandmarkTracker {
         self.motion.push(frame.stamp_nanos, *predicted);
         let measured = frame.points.len() + frame.lines.len();
         let few = matched[0] + matched[1] < FEW_MATCHES.max(measured / FEW_SHARE);
+        let whole = self.memory == Memory::Whole;
         if few && !self.ever_tracked && measured > FEW_MATCHES {
             // Nothing joins the first frame to this one: the map begins here.
             self.points.clear();
             self.lines.clear();
+            let before = if whole { self.hindsight.begun_at.replace(frame.clone()) } else { None };
+            self.hindsight.unplaced.extend(before);
+        } else if whole && !few {
+            self.hindsight.unplaced.push(frame.clone());
         }
         if self.memory == Memory::LastFrame || few {
             let covariance = self.view_covariance(&predicted.inverse(), &self.covariance);
@@ -312,7 +321,7 @@ impl LandmarkTracker {
     }
 
     /// What a frame's measurements find in the map.
-    fn matches(&self, seen: &mut Seen<'_>) -> (Vec<PointMatch>, Vec<LineMatch>) {
+    pub(super) fn matches(&self, seen: &mut Seen<'_>) -> (Vec<PointMatch>, Vec<LineMatch>) {
         let (mut points, mut lines) = (Vec::new(), Vec::new());
         for (place, sighting) in seen.points.iter().enumerate() {
             if let Some(landmark) = self.points.get(&sighting.id) {
@@ -330,8 +339,13 @@ impl LandmarkTracker {
     }
 }
 
-impl Tracker for LandmarkTracker {
-    fn advance(&mut self, frame: &MeasuredFrame) -> Result<FrameTrack, Error> {
+impl LandmarkTracker {
+    /// The seed of a frame's random samples.
+    pub(super) fn seed_of(&self, frame: FrameId) -> u64 {
+        self.setting.seed ^ frame.0.cast_unsigned().wrapping_mul(0x9e37_79b9_7f4a_7c15)
+    }
+
+    fn take(&mut self, frame: &MeasuredFrame) -> Result<FrameTrack, Error> {
         let (camera, noise) = *self
             .setting
             .cameras
@@ -355,6 +369,9 @@ impl Tracker for LandmarkTracker {
         if predicted.is_none() {
             self.motion.push(frame.stamp_nanos, pose);
             self.learn(&at.view, &Seen::new(&at.points, &at.lines), None);
+            if self.memory == Memory::Whole {
+                self.hindsight.first = Some(at.clone());
+            }
             if self.is_empty() {
                 self.start.push(at, 0);
             }
@@ -367,7 +384,7 @@ impl Tracker for LandmarkTracker {
                 residual_rms: None,
             });
         }
-        let seed = self.setting.seed ^ frame.frame_id.0.cast_unsigned().wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let seed = self.seed_of(frame.frame_id);
         if self.is_empty()
             && !self.ever_tracked
             && let Some(camera_from_world) = self.start.push(at.clone(), seed)
@@ -379,9 +396,17 @@ impl Tracker for LandmarkTracker {
         }
         Ok(self.guess(&at, &pose))
     }
+}
 
-    fn revised(&self) -> Vec<(FrameId, FrameTrack)> {
-        self.revised.clone()
+impl Tracker for LandmarkTracker {
+    fn advance(&mut self, frame: &MeasuredFrame) -> Result<FrameTrack, Error> {
+        let track = self.take(frame)?;
+        self.hindsight.tracks.push((frame.frame_id, track));
+        Ok(track)
+    }
+
+    fn revised(&mut self) -> Vec<(FrameId, FrameTrack)> {
+        self.look_back()
     }
 
     fn map(&self) -> TrackerMap {

@@ -63,6 +63,18 @@ impl LineLandmark {
         (finite && segment.length() > 2.0 * doubt).then_some(Self { segment, covariance, contradictions: 0 })
     }
 
+    /// Moves with the world.
+    pub(super) fn shift(&mut self, shift: &Pose) {
+        let moved = Segment { start: *shift * self.segment.start, end: *shift * self.segment.end };
+        let (Some(before), Some(after)) = (LineMatch::across(&self.segment), LineMatch::across(&moved))
+        else {
+            return;
+        };
+        let into = both(&after).transpose() * both(&(shift.rotation_matrix() * before));
+        self.segment = moved;
+        self.covariance = into * self.covariance * into.transpose();
+    }
+
     /// The line with a measurement of it.
     pub(super) fn matched(&self, sighting: &LineSighting) -> LineMatch {
         LineMatch {

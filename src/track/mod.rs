@@ -22,6 +22,7 @@ mod alignment;
 mod classic;
 mod error;
 mod fusion;
+mod hindsight;
 mod landmark_tracker;
 mod line_landmark;
 mod motion;

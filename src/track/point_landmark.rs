@@ -50,6 +50,13 @@ impl PointLandmark {
         })
     }
 
+    /// Moves with the world.
+    pub(super) fn shift(&mut self, shift: &Pose) {
+        let turn = shift.rotation_matrix();
+        self.point = *shift * self.point;
+        self.covariance = turn * self.covariance * turn.transpose();
+    }
+
     /// The point with a measurement of it.
     pub(super) fn matched(&self, sighting: &PointSighting) -> PointMatch {
         PointMatch {

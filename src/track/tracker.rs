@@ -77,8 +77,8 @@ pub trait Tracker {
     /// [`Error::UnknownCamera`] for a frame whose camera the tracker does not know.
     fn advance(&mut self, frame: &MeasuredFrame) -> Result<FrameTrack, Error>;
 
-    /// What it says by now of earlier frames, where that has changed; asked once, after the last frame.
-    fn revised(&self) -> Vec<(FrameId, FrameTrack)> {
+    /// What it says by now of earlier frames, where that has changed; asked once, after the last frame and before the map.
+    fn revised(&mut self) -> Vec<(FrameId, FrameTrack)> {
         Vec::new()
     }
 

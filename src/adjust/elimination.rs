@@ -3,6 +3,7 @@
 use super::block_pattern::{BlockPattern, Ordering};
 use super::error::Error;
 use super::minimise::SolverOptions;
+use super::panels::{Panels, groups};
 use super::plan::{Choice, Eliminate, Factorisation, Plan};
 use super::problem::Problem;
 use super::reduced_system::ReducedSystem;
@@ -95,6 +96,8 @@ pub(super) struct Elimination {
     pub(super) edges: Lists<u32>,
     /// For each reduced block, its edges: eliminated variable and edge.
     pub(super) edges_of_reduced: Lists<(u32, u32)>,
+    /// Eliminated variables whose products are made together.
+    pub(super) panels: Panels,
     /// Where the numbers of each edge's block begin, and how many there are at the end.
     pub(super) edge_start: Vec<usize>,
 }
@@ -105,6 +108,8 @@ struct Candidate {
     pattern: BlockPattern,
     blocks: Vec<usize>,
     ordering: Ordering,
+    /// Eliminated variables whose products are made together.
+    groups: Vec<Vec<usize>>,
     choice: Choice,
 }
 
@@ -145,10 +150,16 @@ impl Elimination {
         let pattern = best.pattern.reordered(&best.ordering.order);
         let is_dense = best.choice.factorisation == Factorisation::Dense;
         let system = ReducedSystem::new(pattern, &sizes, is_dense)?;
-        Ok((Self::of(problem, &best.eliminate, blocks, sizes), system, plan))
+        Ok((Self::of(problem, &best.eliminate, &best.groups, blocks, sizes), system, plan))
     }
 
-    fn of(problem: &Problem, eliminate: &[bool], reduced: Vec<usize>, reduced_sizes: Vec<usize>) -> Self {
+    fn of(
+        problem: &Problem,
+        eliminate: &[bool],
+        groups: &[Vec<usize>],
+        reduced: Vec<usize>,
+        reduced_sizes: Vec<usize>,
+    ) -> Self {
         let eliminated: Vec<usize> =
             (0..problem.len()).filter(|v| eliminate[*v] && !problem.held[*v]).collect();
         let eliminated_sizes: Vec<usize> = eliminated.iter().map(|v| freedom(problem, *v)).collect();
@@ -188,6 +199,12 @@ impl Elimination {
             }
         }
         edge_start.push(numbers);
+        let place = |variable: &usize| match places[*variable] {
+            Place::Eliminated(at) => u32::try_from(at).ok(),
+            _ => None,
+        };
+        let groups = groups.iter().map(|group| group.iter().filter_map(place).collect()).collect();
+        let panels = Panels::new(groups, &edges, &eliminated_sizes, &reduced_sizes);
 
         let (mut of_reduced, mut of_eliminated) = (Vec::new(), Vec::new());
         let (mut pairs_reduced, mut pairs_eliminated) = (Vec::new(), Vec::new());
@@ -225,6 +242,7 @@ impl Elimination {
             incidences_of_eliminated: Lists::gather(eliminated.len(), &of_eliminated),
             pairs_of_eliminated: Lists::gather(eliminated.len(), &pairs_eliminated),
             edges_of_reduced: Lists::gather(reduced.len(), &by_block),
+            panels,
             edges,
             edge_start,
             places,
@@ -362,16 +380,18 @@ impl Candidate {
             }
         }
         let mut cliques_of = vec![Vec::new(); blocks.len()];
-        let mut small = 0.0;
         for (variable, clique) in around.iter_mut().enumerate() {
             clique.sort_unstable();
             clique.dedup();
             clique.iter().for_each(|block| cliques_of[*block as usize].push(variable));
-            let width: usize = clique.iter().map(|block| sizes[*block as usize]).sum();
-            if width > 0 {
-                small += 0.5 * (width as f64).powi(2) * freedom(problem, variable) as f64;
-            }
         }
+        // Poses are alike when they follow each other, landmarks when the same frames see them.
+        let mut order: Vec<usize> =
+            (0..problem.len()).filter(|v| eliminate[*v] && !around[*v].is_empty()).collect();
+        if kind_of(problem, &eliminate) != Eliminate::Poses {
+            order.sort_by_key(|v| (around[*v][0], around[*v][around[*v].len() - 1], *v));
+        }
+        let (groups, large, small) = groups(&order, |v| &around[v], |v| freedom(problem, v), &sizes);
         let pattern = BlockPattern::of(blocks.len(), |column, add| {
             direct[column].iter().for_each(|row| add(*row as usize));
             for clique in &cliques_of[column] {
@@ -395,9 +415,9 @@ impl Candidate {
             eliminated: (0..problem.len()).filter(|v| eliminate[*v] && !problem.held[*v]).count(),
             reduced: rows,
             factorisation: if is_dense { Factorisation::Dense } else { Factorisation::Sparse },
-            elimination_cost: SMALL_BLOCKS * small,
+            elimination_cost: large + SMALL_BLOCKS * small,
             factorisation_cost: if is_dense { dense } else { sparse },
         };
-        Some(Self { eliminate, pattern, blocks, ordering, choice })
+        Some(Self { eliminate, pattern, blocks, ordering, groups, choice })
     }
 }

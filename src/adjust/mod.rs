@@ -19,6 +19,7 @@ mod motion;
 mod normal_equations;
 mod observations;
 mod options;
+mod panels;
 mod parallax_point;
 mod parametrisation;
 mod plan;

@@ -257,6 +257,9 @@ impl NormalEquations {
             }
             for (at, edge) in structure.edges_of_reduced.of(column) {
                 let (at, edge) = (*at as usize, *edge as usize);
+                if structure.panels.has[at] {
+                    continue;
+                }
                 let inner = structure.eliminated_sizes[at];
                 let solved = &solved_ties[structure.edge_start[edge]..structure.edge_start[edge + 1]];
                 for other in edge..structure.edges.start[at + 1] {
@@ -284,6 +287,9 @@ impl NormalEquations {
                 }
             }
         });
+        let Elimination { panels, edges, edge_start, .. } = &mut self.structure;
+        let parts = [&self.ties[..], &self.solved_ties[..]];
+        panels.subtract(edges, edge_start, parts, &self.system, &mut values, &self.column_starts);
         self.system.values = values;
     }
 

@@ -116,6 +116,31 @@ impl ReducedSystem {
         }
     }
 
+    /// A walk down the block rows of a block column.
+    pub(super) fn walk(&self, column: usize) -> Walk<'_> {
+        let below = self.pattern.below(column);
+        let (first, size) = (self.start[column], self.start[column + 1] - self.start[column]);
+        match &self.storage {
+            Storage::Dense { .. } => {
+                let rows = self.rows();
+                Walk {
+                    system: self,
+                    column,
+                    below,
+                    base: first * rows,
+                    offset: first,
+                    stride: rows,
+                    packed: false,
+                }
+            }
+            Storage::Sparse(sparse) => {
+                let starts = sparse.matrix.col_ptr();
+                let (base, stride) = (starts[first] as usize, (starts[first + 1] - starts[first]) as usize);
+                Walk { system: self, column, below, base, offset: size, stride, packed: true }
+            }
+        }
+    }
+
     /// Where the rows of a block column stand: see [`Places`].
     pub(super) fn places<'a>(&self, column: usize, local: &'a mut Vec<usize>) -> Places<'a> {
         local.resize(self.pattern.len(), 0);
@@ -243,5 +268,60 @@ impl Places<'_> {
         } else {
             self.local[row] + column * self.stride
         }
+    }
+}
+
+/// A walk down the block rows of a block column.
+pub(super) struct Walk<'a> {
+    system: &'a ReducedSystem,
+    column: usize,
+    below: &'a [u32],
+    /// Where the block column begins among all values.
+    base: usize,
+    /// The next block row's first number in the first column.
+    offset: usize,
+    stride: usize,
+    packed: bool,
+}
+
+/// A block of a block column.
+pub(super) struct Spot {
+    first: usize,
+    stride: usize,
+    packed: bool,
+}
+
+impl Spot {
+    /// The place of the block's first row in one of its columns, among all values; of a diagonal block the rows above have none.
+    #[inline]
+    pub(super) fn column(&self, column: usize) -> usize {
+        let above = if self.packed { column * (column + 1) / 2 } else { 0 };
+        self.first + column * self.stride - above
+    }
+}
+
+impl Walk<'_> {
+    /// The block of a row that lies further down than the one before; `None` where the pattern has none.
+    #[inline]
+    pub(super) fn advance(&mut self, row: usize) -> Option<Spot> {
+        let (start, Self { base, stride, packed, .. }) = (&self.system.start, &*self);
+        let (base, stride, packed) = (*base, *stride, *packed);
+        if row == self.column {
+            let first = base + if packed { 0 } else { start[row] };
+            return Some(Spot { first, stride, packed });
+        }
+        while let [next, rest @ ..] = self.below {
+            let next = *next as usize;
+            if next > row {
+                return None;
+            }
+            let offset = if packed { self.offset } else { start[next] };
+            self.below = rest;
+            self.offset += start[next + 1] - start[next];
+            if next == row {
+                return Some(Spot { first: base + offset, stride, packed });
+            }
+        }
+        None
     }
 }

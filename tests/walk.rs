@@ -249,3 +249,24 @@ fn values_out_of_range_are_misuse() {
         assert!(words.contains(option) && words.contains("expected"), "{words}");
     }
 }
+
+#[test]
+fn the_solver_says_how_it_goes_about_it_and_does_as_it_is_told() {
+    let folder = Folder::new();
+    let at = folder.path();
+    done(at, &["measure", "walk", "--noise", "first-release", "-o", "measured"]);
+    done(at, &["track", "measured", "-o", "tracked"]);
+    done(at, &["graph", "tracked", "-o", "graph"]);
+    let mut costs = Vec::new();
+    for (eliminate, factorise) in [("landmarks", "dense"), ("poses", "sparse"), ("nothing", "sparse")] {
+        let given = ["--eliminate", eliminate, "--factorise", factorise, "--explain", "--json"];
+        let adjust = ["adjust", "graph", "--method", "point", "-o", "adjusted", "--force"];
+        let words = done(at, &[&adjust[..], &given].concat());
+        assert!(words.contains(&format!("-> eliminate {eliminate}")), "{words}");
+        assert!(words.contains(factorise), "{words}");
+        let cost = words.split("\"final_cost\": ").nth(1).unwrap().split(',').next().unwrap();
+        costs.push(cost.parse::<f64>().unwrap());
+    }
+    // The same minimum, to where steps end.
+    assert!(costs.iter().all(|cost| (cost / costs[0] - 1.0).abs() < 1e-7), "{costs:?}");
+}

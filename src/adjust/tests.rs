@@ -169,24 +169,46 @@ fn jacobians_of_poses_are_their_derivatives() {
 
 #[test]
 fn the_normal_equations_are_solved_whatever_is_eliminated() {
-    let cases = [(Method::Point, 5, 30), (Method::PointLine, 12, 5), (Method::Structural, 6, 20)];
+    let eliminations = [Eliminate::Cheapest, Eliminate::Landmarks, Eliminate::Poses, Eliminate::Nothing];
+    let factorisations = [Factorisation::Cheapest, Factorisation::Dense, Factorisation::Sparse];
+    // The last two are large enough that like variables are multiplied together.
+    let cases = [
+        (Method::Point, 5, 30),
+        (Method::PointLine, 12, 5),
+        (Method::Structural, 6, 20),
+        (Method::Point, 20, 40),
+        (Method::Structural, 24, 30),
+    ];
     for (method, frames, points) in cases {
         let scene = Scene { frames, points, ..small() };
         let problem = estimation(&scene.graph(), &options(method)).problem;
-        let mut equations = NormalEquations::new(&problem, &SolverOptions::default()).unwrap();
-        equations.linearise(&problem);
-        let damping = 1e-3;
-        assert!(equations.factorise(damping));
-        let dense = dense_hessian(&problem, &equations);
-        let right: Vec<f64> = (0..equations.unknowns()).map(|k| libm::sin(k as f64)).collect();
-        let mut step = vec![0.0; right.len()];
-        equations.solve(&right, &mut step);
-        let diagonal = DMatrix::from_diagonal(&DVector::from_column_slice(equations.diagonal()));
-        let found = (dense + diagonal * damping) * DVector::from_vec(step.clone());
-        let error = (&found - DVector::from_column_slice(&right)).amax();
-        // Relative to a right side of about one; the condition is up to 1e6.
-        assert!(error < 1e-8, "{method:?}: {error:e}");
-        assert_eq!(equations.solve_all(&[right])[0], step);
+        for (eliminate, factorisation) in
+            eliminations.into_iter().flat_map(|e| factorisations.into_iter().map(move |f| (e, f)))
+        {
+            let solver = SolverOptions { eliminate, factorisation, ..SolverOptions::default() };
+            let mut equations = match NormalEquations::new(&problem, &solver) {
+                Ok(equations) => equations,
+                // Lines of one group share a direction, so that no kind of landmark is free of the others.
+                Err(Error::Elimination { .. }) if method == Method::Structural => continue,
+                Err(cause) => panic!("{method:?}: {cause}"),
+            };
+            let taken = &equations.plan.choices[equations.plan.taken];
+            assert!(eliminate == Eliminate::Cheapest || taken.eliminate == eliminate, "{taken:?}");
+            assert!(factorisation == Factorisation::Cheapest || taken.factorisation == factorisation);
+            equations.linearise(&problem);
+            let damping = 1e-3;
+            assert!(equations.factorise(damping));
+            let dense = dense_hessian(&problem, &equations);
+            let right: Vec<f64> = (0..equations.unknowns()).map(|k| libm::sin(k as f64)).collect();
+            let mut step = vec![0.0; right.len()];
+            equations.solve(&right, &mut step);
+            let diagonal = DMatrix::from_diagonal(&DVector::from_column_slice(equations.diagonal()));
+            let found = (dense + diagonal * damping) * DVector::from_vec(step.clone());
+            let error = (&found - DVector::from_column_slice(&right)).amax();
+            // Relative to a right side of about one; the condition is up to 1e6.
+            assert!(error < 1e-8, "{method:?}, {eliminate:?}, {factorisation:?}: {error:e}");
+            assert_eq!(equations.solve_all(&[right])[0], step);
+        }
     }
 }
 

@@ -21,7 +21,8 @@ const MOST_NAMES: usize = 8;
 /// Adjust a factor graph: move poses and landmarks to where the measurements agree best.
 ///
 /// The output is the input with the estimate added: trajectory, map and the optimiser's steps. What cannot be used is left out and
-/// counted. The same input gives the same bytes on any number of threads.
+/// counted. Parallel lines are taken from the sequence's structural groups, not from factors of kind `parallelism`, which say the same.
+/// The same input gives the same bytes on any number of threads.
 #[derive(clap::Args, Debug)]
 #[command(after_help = "Methods:
   point        poses and points by pixels (the paper's Point-BA)

@@ -270,3 +270,29 @@ fn the_solver_says_how_it_goes_about_it_and_does_as_it_is_told() {
     // The same minimum, to where steps end.
     assert!(costs.iter().all(|cost| (cost / costs[0] - 1.0).abs() < 1e-7), "{costs:?}");
 }
+
+#[test]
+fn what_estimators_cannot_use_is_refused() {
+    let folder = Folder::new();
+    let at = folder.path();
+    done(at, &["measure", "walk", "--noise", "first-release", "-o", "measured"]);
+    let refused = |arguments: &[&str], expected: &str| {
+        let (code, words) = os(at, arguments);
+        assert_eq!(code, Some(1), "{words}");
+        assert!(words.contains(expected), "{words}");
+    };
+    refused(&["track", "measured", "-o", "x", "--baseline", "0.1"], "--sensor stereo");
+    refused(&["track", "measured", "-o", "x", "--name", "truth"], "stands for the true poses");
+    done(at, &["track", "measured", "-o", "tracked"]);
+    refused(&["adjust", "tracked", "-o", "x"], "`os graph` makes one");
+    refused(&["graph", "tracked", "-o", "x", "--kind", "pose-graph", "--key-frames"], "--kind reprojection");
+    refused(&["graph", "tracked", "-o", "x", "--min-views", "9999"], "would be empty");
+    done(at, &["graph", "tracked", "-o", "graph"]);
+    refused(&["adjust", "graph", "-o", "x", "--method", "point", "--no-groups"], "--method structural");
+    let manifest = at.join("measured/sequence.json");
+    let text = fs::read_to_string(&manifest).unwrap();
+    assert!(text.contains("\"pinhole\""));
+    fs::write(&manifest, text.replace("\"pinhole\"", "\"fisheye\"")).unwrap();
+    refused(&["track", "measured", "-o", "x"], "found `fisheye`");
+    assert!(!at.join("x").exists());
+}

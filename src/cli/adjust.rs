@@ -238,6 +238,7 @@ impl Args {
 pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome> {
     args.refuse_idle()?;
     let (mut sequence, mut outcome) = extended::read(&args.sequence, &args.output, args.force)?;
+    extended::check_cameras(&sequence)?;
     let options = args.options();
     let name = options.estimate_name().to_owned();
     extended::check_name("an estimate", &name, Estimate::is_in(&sequence, &name), args.replace)?;

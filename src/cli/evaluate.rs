@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::ValueEnum;
 
-use super::{Outcome, evaluate_files, evaluate_output, evaluate_shown};
+use super::{Outcome, evaluate_files, evaluate_output, evaluate_shown, parsed};
 use crate::evaluate::{
     Alignment, AlignmentKind, Delta, EvaluateOptions, Evaluated, Reconstruction, Relation, Step, evaluate,
     summary_table,
@@ -73,7 +73,7 @@ pub(super) struct Args {
     #[arg(long, alias = "pairs_from_reference")]
     pairs_from_reference: bool,
     /// Largest difference of the stamps of poses that belong together, seconds.
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.01, requires = "files", alias = "t_max_diff")]
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.01, requires = "files", alias = "t_max_diff", value_parser = parsed::not_negative)]
     max_difference: f64,
     /// Seconds to add to the estimates' stamps.
     #[arg(

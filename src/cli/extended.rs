@@ -53,3 +53,17 @@ pub(super) fn check_name(kind: &str, name: &str, is_taken: bool, replace: bool) 
     );
     Ok(())
 }
+
+/// Refuses cameras that project otherwise than estimators here do.
+pub(super) fn check_cameras(sequence: &Sequence) -> anyhow::Result<()> {
+    for camera in &sequence.manifest.cameras {
+        anyhow::ensure!(
+            camera.model == registry::PINHOLE,
+            "sequence.json: {}: expected the model `{}`, found `{}`",
+            camera.camera_id,
+            registry::PINHOLE,
+            camera.model
+        );
+    }
+    Ok(())
+}

@@ -81,7 +81,11 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome> {
+    if args.kind == Kind::PoseGraph && args.key_frames {
+        anyhow::bail!("--key-frames goes with --kind reprojection");
+    }
     let (mut sequence, mut outcome) = extended::read(&args.sequence, &args.output, args.force)?;
+    extended::check_cameras(&sequence)?;
     let estimate = choose(&sequence, args.estimate.as_deref())?;
     let suffix = if args.kind == Kind::PoseGraph { "-pose-graph" } else { "" };
     let name = args.name.clone().unwrap_or_else(|| format!("{}{suffix}", estimate.name));

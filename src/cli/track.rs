@@ -108,6 +108,9 @@ impl Args {
     }
 
     fn options(&self, sensor: SensorName) -> anyhow::Result<TrackOptions> {
+        if self.baseline.is_some() && !matches!(sensor, SensorName::Stereo) {
+            anyhow::bail!("--baseline goes with --sensor stereo");
+        }
         let sensor = match sensor {
             SensorName::Monocular => Sensor::Monocular,
             SensorName::Rgbd => Sensor::Rgbd,
@@ -127,6 +130,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     let (mut sequence, mut outcome) = extended::read(&args.sequence, &args.output, args.force)?;
     let name = args.name.clone().unwrap_or_else(|| args.default_name());
     extended::check_name("an estimate", &name, Estimate::is_in(&sequence, &name), args.replace)?;
+    extended::check_cameras(&sequence)?;
     let frames = MeasuredFrame::of(&sequence);
     let measured = frames.iter().any(|frame| !frame.points.is_empty() || !frame.lines.is_empty());
     anyhow::ensure!(measured, "the sequence has no measurements; `os measure` makes them of observations");

@@ -187,7 +187,7 @@ fn a_sequence_that_has_changed_is_run_anew() {
         "mine",
     ];
     let with_estimate = |shift: f64| {
-        let mut sequence = format::read(&at.join("one")).unwrap();
+        let mut sequence = format::read(at.join("one")).unwrap();
         let rows = sequence.frames.iter().map(|frame| {
             let mut pose = frame.world_from_camera().unwrap();
             pose.translation[0] += if frame.frame_id.0 % 2 == 0 { shift } else { 0.0 };

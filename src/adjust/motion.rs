@@ -17,7 +17,7 @@ const FAR_BELOW: f64 = 8.0;
 const DOUBT: f64 = 2.0;
 
 /// The part of the changes of motion that is looked at, and what it is for a number of three normal components of sigma one.
-const QUANTILE: f64 = 0.75;
+const QUANTILE: [usize; 2] = [3, 4];
 const QUANTILE_OF_THREE: f64 = 2.027;
 
 /// Standard deviations of the motion between neighbours about that of the start.
@@ -111,7 +111,7 @@ impl Observations {
             shifts.push(change.fixed_rows::<3>(3).norm());
         }
         let sigma = |mut changes: Vec<f64>| {
-            let place = (changes.len() as f64 * QUANTILE) as usize;
+            let place = changes.len() * QUANTILE[0] / QUANTILE[1];
             let (_, found, _) = changes.select_nth_unstable_by(place, f64::total_cmp);
             // A start that moves evenly to the last digit says nothing of its errors.
             (*found * DOUBT / QUANTILE_OF_THREE).max(LEAST_SIGMA)

@@ -36,7 +36,7 @@ struct Panel {
 /// All panels of an elimination.
 #[derive(Default)]
 pub(super) struct Panels {
-    panels: Vec<Panel>,
+    all: Vec<Panel>,
     /// For each eliminated variable, whether a panel has it.
     pub(super) has: Vec<bool>,
     batch: Vec<Product>,
@@ -47,7 +47,7 @@ pub(super) struct Panels {
 struct Product {
     ties: Vec<f64>,
     solved: Vec<f64>,
-    product: Vec<f64>,
+    entries: Vec<f64>,
 }
 
 /// Groups of variables with their cost; `None` for the place of a group stands for a variable that is better alone.
@@ -131,9 +131,9 @@ impl Panels {
             let rows = members.iter().map(|member| heights[*member as usize]).sum();
             Panel { members, blocks, columns, rows }
         });
-        let panels = panels.collect();
+        let all = panels.collect();
         let batch = (0..BATCH).map(|_| Product::default()).collect();
-        Self { panels, has, batch }
+        Self { all, has, batch }
     }
 
     /// Takes `Σ Wᵀ H⁻¹ W` of all panels off the values of a reduced system.
@@ -150,8 +150,8 @@ impl Panels {
         values: &mut [f64],
         column_starts: &[usize],
     ) {
-        let Self { panels, batch, .. } = self;
-        for panels in panels.chunks(BATCH) {
+        let Self { all, batch, .. } = self;
+        for panels in all.chunks(BATCH) {
             batch.par_iter_mut().zip(panels).with_max_len(1).for_each(|(product, panel)| {
                 product.make(panel, edges, edge_start, [ties, solved]);
             });
@@ -170,7 +170,7 @@ impl Panels {
                     let place =
                         |block: usize| panel.blocks.partition_point(|other| (*other as usize) < block);
                     for at in place(columns.start)..place(columns.end) {
-                        panel.bring(at, &product.product, system, part, begin);
+                        panel.bring(at, &product.entries, system, part, begin);
                     }
                 }
             });
@@ -204,12 +204,12 @@ impl Product {
                 row += height;
             }
         }
-        self.product.resize(columns * columns, 0.0);
+        self.entries.resize(columns * columns, 0.0);
         // Row by row is the transposed, column by column.
         let left = MatRef::from_column_major_slice(&self.ties, columns, rows);
         let right = MatRef::from_column_major_slice(&self.solved, columns, rows).transpose();
         triangular::matmul(
-            MatMut::from_column_major_slice_mut(&mut self.product, columns, columns),
+            MatMut::from_column_major_slice_mut(&mut self.entries, columns, columns),
             BlockStructure::TriangularLower,
             Accum::Replace,
             left,

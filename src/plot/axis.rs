@@ -1,5 +1,8 @@
 //! An axis of a chart: from numbers to places, with round ticks.
 
+/// What is nearer to zero than this is drawn there.
+const LEAST_NUMBER: f64 = 1e-280;
+
 /// Where the numbers of a chart lie along one of its sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Axis {
@@ -19,6 +22,8 @@ impl Axis {
     /// An axis from one number to another; widened where both are the same.
     pub(super) fn linear(low: f64, high: f64) -> Self {
         let (low, high) = if low.is_finite() && high.is_finite() { (low, high) } else { (0.0, 1.0) };
+        // So near to zero, steps between numbers are no longer numbers.
+        let [low, high] = [low, high].map(|number| if number.abs() < LEAST_NUMBER { 0.0 } else { number });
         let wide = (high - low).is_finite() && high - low > 1e-12 * low.abs().max(high.abs());
         let half = if low == 0.0 && high == 0.0 { 0.5 } else { 0.5 * low.abs().max(high.abs()) };
         let (low, high) = if wide { (low, high) } else { (low - half, high + half) };

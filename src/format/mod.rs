@@ -44,6 +44,7 @@ pub use error::Error;
 pub use frames::Frames;
 pub use json_schema::json_schema;
 pub(crate) use mcap_survey::{Faults, McapSurvey, survey_file};
+#[cfg(feature = "cli")]
 pub(crate) use partial::Partial;
 pub use partial::discard_unfinished;
 pub use reader::{SequenceReader, open, read};

@@ -63,7 +63,7 @@ impl<T: Copy> Lists<T> {
     }
 
     /// Lists from pairs of owner and item; items keep their order.
-    fn gather(owners: usize, pairs: &[(usize, T)]) -> Self {
+    pub(super) fn gather(owners: usize, pairs: &[(usize, T)]) -> Self {
         let mut start = vec![0; owners + 1];
         pairs.iter().for_each(|(owner, _)| start[owner + 1] += 1);
         for owner in 0..owners {
@@ -323,6 +323,11 @@ fn choices(problem: &Problem) -> Vec<Vec<bool>> {
     }
     let of_set = |set: Vec<bool>| problem.space_of.iter().map(|kind| set[*kind as usize]).collect();
     sets.into_iter().map(of_set).collect()
+}
+
+/// Sets of variables that do not meet in a factor: whole kinds.
+pub(super) fn independent_sets(problem: &Problem) -> Vec<Vec<bool>> {
+    choices(problem).into_iter().filter(|set| set.contains(&true)).collect()
 }
 
 /// Pairs of reduced blocks that a choice ties, counted as often as they are.

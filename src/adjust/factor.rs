@@ -1,6 +1,6 @@
 //! A factor: a residual over variables, and batches of factors of one kind.
 
-use super::loss::Loss;
+use super::loss::{Loss, LossSum};
 use super::problem::{Values, Variable};
 use std::ops::Range;
 
@@ -67,6 +67,15 @@ pub trait Factor: Send + Sync {
     fn evaluate(&self, values: &Values<'_>, residual: &mut [f64], jacobian: Option<&mut [f64]>) -> bool;
 }
 
+/// Where what is linear of some factors goes.
+pub(super) struct LinearChunk<'a> {
+    pub(super) residuals: &'a mut [f64],
+    /// Row by row, factor by factor.
+    pub(super) jacobians: &'a mut [f64],
+    /// By what each factor's residual and Jacobian are multiplied: the root of its weight.
+    pub(super) roots: &'a mut [f64],
+}
+
 /// Factors of one kind with one loss: the loop over them knows their type.
 pub(super) trait Batch: Send + Sync {
     /// Factors.
@@ -75,16 +84,12 @@ pub(super) trait Batch: Send + Sync {
     fn residuals(&self) -> usize;
     /// Appends the variables of every factor.
     fn variables(&self, into: &mut Vec<Variable>);
-    /// Evaluates a range of factors; residuals and Jacobians come out weighted by the root of the loss' weight.
-    ///
-    /// Gives the cost `½ Σ ρ`, infinite where a factor has no residual.
-    fn evaluate(
-        &self,
-        range: Range<usize>,
-        values: &Values<'_>,
-        residuals: &mut [f64],
-        jacobians: Option<(&mut [f64], usize)>,
-    ) -> f64;
+    /// Their loss.
+    fn loss(&self) -> Loss;
+    /// The cost `½ Σ ρ` of a range of factors, infinite where one has no residual.
+    fn cost(&self, range: Range<usize>, values: &Values<'_>) -> f64;
+    /// Residuals and Jacobians of a range of factors, weighted by the root of the loss' weight; gives the cost as well.
+    fn linearise(&self, range: Range<usize>, values: &Values<'_>, into: LinearChunk<'_>) -> f64;
     /// Squared norm of the whitened residual of one factor, before the loss; `None` where there is none.
     fn squared(&self, factor: usize, values: &Values<'_>) -> Option<f64>;
 }
@@ -110,38 +115,52 @@ impl<F: Factor> Batch for Kind<F> {
         }
     }
 
-    fn evaluate(
-        &self,
-        range: Range<usize>,
-        values: &Values<'_>,
-        residuals: &mut [f64],
-        mut jacobians: Option<(&mut [f64], usize)>,
-    ) -> f64 {
-        let mut cost = 0.0;
-        for (index, factor) in self.factors[range].iter().enumerate() {
-            let residual = &mut residuals[index * F::RESIDUALS..(index + 1) * F::RESIDUALS];
-            let size = jacobians.as_ref().map_or(0, |(_, columns)| F::RESIDUALS * columns);
-            let mut jacobian = jacobians.as_mut().map(|(all, _)| &mut all[index * size..(index + 1) * size]);
-            if !factor.evaluate(values, residual, jacobian.as_deref_mut()) {
+    fn loss(&self) -> Loss {
+        self.loss
+    }
+
+    fn cost(&self, range: Range<usize>, values: &Values<'_>) -> f64 {
+        let mut sum = LossSum::new(self.loss);
+        let mut residual = [0.0; MOST_RESIDUALS];
+        let residual = &mut residual[..F::RESIDUALS];
+        for factor in &self.factors[range] {
+            if !factor.evaluate(values, residual, None) {
                 return f64::INFINITY;
             }
-            let squared: f64 = residual.iter().map(|r| r * r).sum();
-            let (rho, weight) = self.loss.evaluate(squared);
-            cost += 0.5 * rho;
+            sum.add(squared_norm(residual));
+        }
+        let cost = 0.5 * sum.total();
+        if cost.is_nan() { f64::INFINITY } else { cost }
+    }
+
+    fn linearise(&self, range: Range<usize>, values: &Values<'_>, into: LinearChunk<'_>) -> f64 {
+        let LinearChunk { residuals, jacobians, roots } = into;
+        let mut sum = LossSum::new(self.loss);
+        let size = jacobians.len() / roots.len().max(1);
+        let places = residuals.chunks_exact_mut(F::RESIDUALS).zip(jacobians.chunks_exact_mut(size.max(1)));
+        for ((factor, root), (residual, jacobian)) in self.factors[range].iter().zip(roots).zip(places) {
+            if !factor.evaluate(values, residual, Some(jacobian)) {
+                return f64::INFINITY;
+            }
+            let weight = sum.add(squared_norm(residual));
+            *root = weight.sqrt();
             if weight < 1.0 {
-                let root = weight.sqrt();
-                residual.iter_mut().for_each(|r| *r *= root);
-                if let Some(jacobian) = jacobian {
-                    jacobian.iter_mut().for_each(|j| *j *= root);
-                }
+                residual.iter_mut().for_each(|r| *r *= *root);
+                jacobian.iter_mut().for_each(|j| *j *= *root);
             }
         }
+        let cost = 0.5 * sum.total();
         if cost.is_nan() { f64::INFINITY } else { cost }
     }
 
     fn squared(&self, factor: usize, values: &Values<'_>) -> Option<f64> {
         let mut residual = [0.0; MOST_RESIDUALS];
         let residual = &mut residual[..F::RESIDUALS];
-        self.factors[factor].evaluate(values, residual, None).then(|| residual.iter().map(|r| r * r).sum())
+        self.factors[factor].evaluate(values, residual, None).then(|| squared_norm(residual))
     }
+}
+
+#[inline]
+fn squared_norm(residual: &[f64]) -> f64 {
+    residual.iter().map(|r| r * r).sum()
 }

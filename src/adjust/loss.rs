@@ -58,6 +58,37 @@ impl Loss {
         }
     }
 
+    /// The weight `ρ'(s)` alone.
+    #[inline]
+    pub(super) fn weight(self, squared: f64) -> f64 {
+        match self {
+            Self::Cauchy(scale) => 1.0 / (1.0 + squared / (scale * scale)),
+            _ => self.evaluate(squared).1,
+        }
+    }
+
+    /// Curvature along the residual over that across it: `1 + 2 s ρ''(s)/ρ'(s)`, below zero where the loss bends down.
+    #[must_use]
+    pub fn stiffness(self, squared: f64) -> f64 {
+        match self {
+            Self::None => 1.0,
+            Self::Huber(scale) if squared <= scale * scale => 1.0,
+            Self::Huber(_) => 0.0,
+            Self::Cauchy(scale) => {
+                let limit = scale * scale;
+                (limit - squared) / (limit + squared)
+            }
+            Self::Tukey(scale) => {
+                let ratio = squared / (scale * scale);
+                if ratio < 1.0 { (1.0 - 5.0 * ratio) / (1.0 - ratio) } else { 0.0 }
+            }
+            Self::GemanMcClure(scale) => {
+                let limit = scale * scale;
+                (limit - 3.0 * squared) / (limit + squared)
+            }
+        }
+    }
+
     /// Whether the scale is a number that a loss can have: finite and over zero.
     #[must_use]
     pub fn is_valid(self) -> bool {
@@ -67,6 +98,55 @@ impl Loss {
                 scale.is_finite() && scale > 0.0
             }
         }
+    }
+}
+
+/// The sum of a loss over many residuals, which needs a logarithm for many of them only.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LossSum {
+    loss: Loss,
+    sum: f64,
+    /// `Π (1 + s/c²) − 1` of what is not in the sum yet, for Cauchy's loss.
+    product: f64,
+}
+
+/// Product at which its logarithm is taken.
+const MOST_PRODUCT: f64 = 1e100;
+
+impl LossSum {
+    pub(super) fn new(loss: Loss) -> Self {
+        Self { loss, sum: 0.0, product: 0.0 }
+    }
+
+    /// Adds `ρ(s)`; gives the weight `ρ'(s)`.
+    #[inline]
+    pub(super) fn add(&mut self, squared: f64) -> f64 {
+        if let Loss::Cauchy(scale) = self.loss {
+            let ratio = squared / (scale * scale);
+            // ln(1 + p) + ln(1 + t) = ln(1 + (p + t + p t)), with every digit of small ones.
+            self.product += ratio + self.product * ratio;
+            if self.product.is_nan() || self.product > MOST_PRODUCT {
+                self.flush();
+            }
+            1.0 / (1.0 + ratio)
+        } else {
+            let (rho, weight) = self.loss.evaluate(squared);
+            self.sum += rho;
+            weight
+        }
+    }
+
+    fn flush(&mut self) {
+        if let Loss::Cauchy(scale) = self.loss {
+            self.sum += scale * scale * libm::log1p(self.product);
+            self.product = 0.0;
+        }
+    }
+
+    /// `Σ ρ`.
+    pub(super) fn total(mut self) -> f64 {
+        self.flush();
+        self.sum
     }
 }
 
@@ -123,6 +203,41 @@ mod tests {
             for loss in losses() {
                 let ((near, near_weight), (far, far_weight)) = (loss.evaluate(s), loss.evaluate(s + more));
                 prop_assert!(far >= near && far_weight <= near_weight && near <= s + 1e-12);
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn a_sum_of_losses_is_that_of_each(
+            residuals in proptest::collection::vec(prop_oneof![0.0..1e-20_f64, 0.0..10.0_f64, 0.0..1e90_f64], 0..60),
+        ) {
+            for loss in losses() {
+                let mut sum = LossSum::new(loss);
+                let mut expected = 0.0;
+                for squared in &residuals {
+                    let (rho, weight) = loss.evaluate(*squared);
+                    expected += rho;
+                    prop_assert!((sum.add(*squared) - weight).abs() <= 1e-15 * weight);
+                }
+                let found = sum.total();
+                prop_assert!((found - expected).abs() <= 1e-13 * expected, "{loss:?}: {found} for {expected}");
+            }
+        }
+
+        #[test]
+        fn the_stiffness_is_the_curvature_along_the_residual(r in 1e-2..7.0_f64) {
+            for loss in losses() {
+                let h = 1e-4 * r;
+                let slope = |r: f64| r * loss.evaluate(r * r).1;
+                let difference = (slope(r + h) - slope(r - h)) / (2.0 * h);
+                let (_, weight) = loss.evaluate(r * r);
+                // The kinks of Huber and Tukey have no curvature.
+                let kink = match loss {
+                    Loss::Huber(scale) | Loss::Tukey(scale) => (r - scale).abs() < 2.0 * h,
+                    _ => false,
+                };
+                prop_assert!(kink || (difference - weight * loss.stiffness(r * r)).abs() < 1e-5, "{loss:?} at {r}");
             }
         }
     }

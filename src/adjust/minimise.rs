@@ -1,9 +1,12 @@
 //! Levenberg-Marquardt and dog-leg: from a start to the nearest least cost.
 
 use super::error::Error;
+use super::linearisation::Linearisation;
 use super::normal_equations::NormalEquations;
 use super::plan::{Eliminate, Factorisation, Plan};
 use super::problem::{Problem, Variable};
+use super::refinement::Refinement;
+use super::region::Region;
 
 /// How steps are kept within the trusted region.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -126,10 +129,6 @@ pub struct Minimum {
     pub plan: Plan,
 }
 
-/// Damping is kept above this, so that what the measurements leave open (a free scale) stays where it is.
-const LEAST_DAMPING: f64 = 1e-12;
-/// Damping above which no step helps.
-const MOST_DAMPING: f64 = 1e16;
 /// A step is taken when it keeps at least this part of its promise.
 const LEAST_PROMISE: f64 = 1e-4;
 
@@ -137,7 +136,8 @@ const LEAST_PROMISE: f64 = 1e-4;
 ///
 /// Steps solve the normal equations by blocks; one set of variables that do not meet in a factor is eliminated first, the one that makes
 /// the rest cheapest. Levenberg-Marquardt: `λ` shrinks by `max(1/3, 1 − (2ϱ − 1)³)` after a step with gain ratio `ϱ`, and grows by
-/// 2, 4, 8, … after steps that were rejected (Nielsen). The result has the same bits on any number of threads.
+/// 2, 4, 8, … after steps that were rejected (Nielsen). With a robust loss, steps near the end are found with the loss as it is, not
+/// with its weights held, and mended where the way bends. The result has the same bits on any number of threads.
 ///
 /// # Errors
 /// [`Error::Start`] when the cost at the start is not finite, [`Error::TooLarge`], [`Error::Option`].
@@ -178,28 +178,56 @@ pub fn minimise_watched(
     }
     let mut region = Region::new(options, equations.unknowns());
     let mut moved = problem.numbers.clone();
-    let mut residuals = vec![0.0; problem.layout.residuals];
+    let mut next = Linearisation::new(problem);
+    let is_damped = options.optimiser == Optimiser::LevenbergMarquardt;
+    let mut refinement = if is_damped { Refinement::new(problem, &equations) } else { None };
     let mut step = vec![0.0; equations.unknowns()];
     let mut fresh = true;
     for _ in 0..options.max_iterations {
         let gradient_max = equations.gradient_max();
         let mut tried = Step { cost, gradient_max, damping: region.damping(), ..Step::default() };
-        let promise = region.step(problem, &mut equations, fresh, &mut step);
-        fresh = false;
+        let mut promise = region.step(problem, &mut equations, fresh, &mut step);
+        if let (Some(promise), Some(refinement)) = (&mut promise, &mut refinement) {
+            *promise = refinement.lengthen(problem, &equations, region.damping, *promise, &mut step);
+        }
+        // A step that follows one that was taken is mostly taken as well: what is linear there is made at once.
+        let mut is_made = std::mem::replace(&mut fresh, false);
         tried.decrease = f64::NEG_INFINITY;
         let mut size = f64::INFINITY;
         if let Some(promise) = promise {
-            tried.step_norm = step.iter().map(|s| s * s).sum::<f64>().sqrt();
-            size = scaled_norm(&step, equations.diagonal());
-            move_all(problem, &equations, &step, &mut moved);
-            let there = problem.evaluate(&moved, &mut residuals, None);
-            tried.decrease = cost - there;
-            let ratio = tried.decrease / promise;
             // Near the end rounding decides whether the cost falls.
             let rounding = 1e-14 * cost;
-            if tried.decrease > 0.0 && (ratio > LEAST_PROMISE || promise <= rounding) {
+            let keeps =
+                |decrease: f64, ratio: f64| decrease > 0.0 && (ratio > LEAST_PROMISE || promise <= rounding);
+            move_all(problem, &equations, &step, &mut moved);
+            let mut there =
+                if is_made { problem.linearise(&moved, &mut next) } else { problem.cost_at(&moved) };
+            let mut ratio = (cost - there) / promise;
+            if let Some(refinement) = &mut refinement {
+                if is_made && there.is_finite() && refinement.is_crooked(ratio) {
+                    there = refinement.settle(problem, &mut moved, &mut next, there);
+                    ratio = ((cost - there) / promise).min(Refinement::CAUTIOUS);
+                }
+                if !keeps(cost - there, ratio)
+                    && let Some(promise) = refinement.shorten(&mut step)
+                {
+                    move_all(problem, &equations, &step, &mut moved);
+                    is_made = false;
+                    there = problem.cost_at(&moved);
+                    ratio = ((cost - there) / promise).min(Refinement::CAUTIOUS);
+                }
+            }
+            tried.decrease = cost - there;
+            tried.step_norm = step.iter().map(|s| s * s).sum::<f64>().sqrt();
+            size = scaled_norm(&step, equations.diagonal());
+            if keeps(tried.decrease, ratio) {
                 std::mem::swap(&mut problem.numbers, &mut moved);
-                cost = equations.linearise(problem);
+                if is_made {
+                    equations.take(&mut next);
+                } else {
+                    equations.linearise(problem);
+                }
+                cost = there;
                 tried.cost = cost;
                 tried.accepted = true;
                 region.succeed(ratio, size);
@@ -207,6 +235,7 @@ pub fn minimise_watched(
             } else {
                 region.fail(size);
             }
+            refinement.iter_mut().for_each(|refinement| refinement.learn(&tried, &step));
             if promise <= rounding && !tried.accepted {
                 minimum.steps.push(tried);
                 minimum.ending = Ending::Stuck;
@@ -273,7 +302,7 @@ impl SolverOptions {
 }
 
 /// The length of a step in units of `√diag H`.
-fn scaled_norm(step: &[f64], diagonal: &[f64]) -> f64 {
+pub(super) fn scaled_norm(step: &[f64], diagonal: &[f64]) -> f64 {
     step.iter().zip(diagonal).map(|(s, d)| s * s * d).sum::<f64>().sqrt()
 }
 
@@ -288,152 +317,6 @@ fn move_all(problem: &Problem, equations: &NormalEquations, step: &[f64], moved:
                 space.plus(&problem.numbers[numbers.clone()], &step[range], &mut moved[numbers]);
             }
             None => moved[numbers.clone()].copy_from_slice(&problem.numbers[numbers]),
-        }
-    }
-}
-
-/// What is trusted of the linear model.
-struct Region {
-    optimiser: Optimiser,
-    damping: f64,
-    growth: f64,
-    radius: f64,
-    /// The two steps between which a dog-leg goes.
-    newton: Vec<f64>,
-    descent: Vec<f64>,
-    has_newton: bool,
-    right: Vec<f64>,
-}
-
-impl Region {
-    fn new(options: &SolverOptions, unknowns: usize) -> Self {
-        let legs = if options.optimiser == Optimiser::DogLeg { unknowns } else { 0 };
-        Self {
-            optimiser: options.optimiser,
-            damping: options.damping,
-            growth: 2.0,
-            radius: f64::INFINITY,
-            newton: vec![0.0; legs],
-            descent: vec![0.0; legs],
-            has_newton: false,
-            right: vec![0.0; unknowns],
-        }
-    }
-
-    fn damping(&self) -> f64 {
-        match self.optimiser {
-            Optimiser::LevenbergMarquardt => self.damping,
-            Optimiser::DogLeg => 1.0 / self.radius,
-        }
-    }
-
-    /// Finds a step; gives the decrease of the cost that the linear model promises, `None` where there is no step.
-    fn step(
-        &mut self,
-        problem: &Problem,
-        equations: &mut NormalEquations,
-        fresh: bool,
-        step: &mut [f64],
-    ) -> Option<f64> {
-        for (right, gradient) in self.right.iter_mut().zip(equations.gradient()) {
-            *right = -gradient;
-        }
-        match self.optimiser {
-            Optimiser::LevenbergMarquardt => {
-                if !equations.factorise(self.damping) {
-                    return None;
-                }
-                equations.solve(&self.right, step);
-                let parts = step.iter().zip(equations.gradient()).zip(equations.diagonal());
-                // −gᵀδ − ½ δᵀHδ with Hδ = −g − λDδ.
-                let promise: f64 = parts.map(|((s, g), d)| 0.5 * s * (self.damping * d * s - g)).sum();
-                (promise.is_finite() && promise > 0.0).then_some(promise)
-            }
-            Optimiser::DogLeg => {
-                if fresh || !self.has_newton {
-                    self.legs(problem, equations)?;
-                }
-                self.bend(equations.diagonal(), step);
-                let slope: f64 = step.iter().zip(equations.gradient()).map(|(s, g)| s * g).sum();
-                let promise = -slope - 0.5 * equations.squared_change(problem, step);
-                (promise.is_finite() && promise > 0.0).then_some(promise)
-            }
-        }
-    }
-
-    /// Steepest descent and Gauss-Newton from here; the latter damped as little as it needs to be.
-    fn legs(&mut self, problem: &Problem, equations: &mut NormalEquations) -> Option<()> {
-        let mut damping = 1e-10;
-        while !equations.factorise(damping) {
-            damping *= 100.0;
-            if damping > 1.0 {
-                return None;
-            }
-        }
-        equations.solve(&self.right, &mut self.newton);
-        for ((descent, right), diagonal) in self.descent.iter_mut().zip(&self.right).zip(equations.diagonal())
-        {
-            *descent = right / diagonal;
-        }
-        let slope: f64 = self.descent.iter().zip(&self.right).map(|(d, r)| d * r).sum();
-        let change = equations.squared_change(problem, &self.descent);
-        let length = if change > 0.0 { slope / change } else { 0.0 };
-        self.descent.iter_mut().for_each(|d| *d *= length);
-        self.has_newton = self.newton.iter().chain(&self.descent).all(|entry| entry.is_finite());
-        if self.radius.is_infinite() {
-            // The first step is trusted as far as Gauss-Newton goes.
-            self.radius = scaled_norm(&self.newton, equations.diagonal());
-        }
-        self.has_newton.then_some(())
-    }
-
-    /// The point of the dog-leg at the trusted radius.
-    fn bend(&self, diagonal: &[f64], step: &mut [f64]) {
-        let newton = scaled_norm(&self.newton, diagonal);
-        let descent = scaled_norm(&self.descent, diagonal);
-        if newton <= self.radius {
-            step.copy_from_slice(&self.newton);
-        } else if descent >= self.radius {
-            let scale = self.radius / descent;
-            step.iter_mut().zip(&self.descent).for_each(|(step, d)| *step = d * scale);
-        } else {
-            // |descent + t (newton − descent)| = radius
-            let (mut a, mut b) = (0.0, 0.0);
-            for ((n, d), weight) in self.newton.iter().zip(&self.descent).zip(diagonal) {
-                a += weight * (n - d) * (n - d);
-                b += weight * d * (n - d);
-            }
-            let c = descent * descent - self.radius * self.radius;
-            let t = if a > 0.0 { -c / (b + (b * b - a * c).max(0.0).sqrt()) } else { 0.0 };
-            for ((step, n), d) in step.iter_mut().zip(&self.newton).zip(&self.descent) {
-                *step = d + t.clamp(0.0, 1.0) * (n - d);
-            }
-        }
-    }
-
-    /// After a step that was taken: its gain ratio, and its length in units of `√diag H`.
-    fn succeed(&mut self, ratio: f64, size: f64) {
-        let better = 2.0 * ratio - 1.0;
-        self.damping = (self.damping * (1.0 - better * better * better).max(1.0 / 3.0)).max(LEAST_DAMPING);
-        self.growth = 2.0;
-        if ratio > 0.75 {
-            self.radius = self.radius.max(3.0 * size);
-        } else if ratio < 0.25 {
-            self.radius *= 0.5;
-        }
-    }
-
-    /// After a step that was not.
-    fn fail(&mut self, size: f64) {
-        self.damping *= self.growth;
-        self.growth *= 2.0;
-        self.radius = 0.25 * self.radius.min(size);
-    }
-
-    fn is_lost(&self) -> bool {
-        match self.optimiser {
-            Optimiser::LevenbergMarquardt => self.damping > MOST_DAMPING,
-            Optimiser::DogLeg => self.radius < 1e-12 || self.radius.is_nan(),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::elimination::for_each_factor;
 use super::estimation::Estimation;
+use super::linearisation::Linearisation;
 use super::observations::{Observations, RelativeView};
 use crate::structure::FrameId;
 use nalgebra::{DMatrix, DVector, Matrix6, SymmetricEigen, Vector6};
@@ -130,9 +131,8 @@ const LEAST_STEPS: usize = 8;
 /// What the factors of each pose say of it when everything else is known: `Σ JᵀJ`; zero for one that is held.
 fn own_information(estimation: &Estimation) -> Vec<Matrix6<f64>> {
     let problem = &estimation.problem;
-    let mut residuals = vec![0.0; problem.layout.residuals];
-    let mut jacobians = vec![0.0; problem.layout.jacobians];
-    problem.evaluate(&problem.numbers, &mut residuals, Some(&mut jacobians));
+    let mut linear = Linearisation::new(problem);
+    problem.linearise(&problem.numbers, &mut linear);
     let mut pose_of = vec![usize::MAX; problem.len()];
     estimation.poses.iter().enumerate().for_each(|(place, variable)| pose_of[variable.index()] = place);
     let mut found = vec![Matrix6::zeros(); estimation.poses.len()];
@@ -142,7 +142,7 @@ fn own_information(estimation: &Estimation) -> Vec<Matrix6<f64>> {
             for row in 0..usize::from(incidence.rows) {
                 let start =
                     incidence.jacobian + row * usize::from(incidence.columns) + usize::from(incidence.column);
-                let row = Vector6::from_column_slice(&jacobians[start..start + 6]);
+                let row = Vector6::from_column_slice(&linear.jacobians[start..start + 6]);
                 *information += row * row.transpose();
             }
         }

@@ -2,6 +2,7 @@
 
 use super::elimination::{Elimination, Incidence, Pair, Place};
 use super::error::Error;
+use super::linearisation::Linearisation;
 use super::minimise::SolverOptions;
 use super::plan::Plan;
 use super::problem::Problem;
@@ -25,8 +26,7 @@ pub(super) struct NormalEquations {
     pub(super) plan: Plan,
     /// First number of each variable's step among all: reduced blocks first, then eliminated ones.
     step_start: Vec<usize>,
-    residuals: Vec<f64>,
-    jacobians: Vec<f64>,
+    pub(super) linear: Linearisation,
     gradient: Vec<f64>,
     diagonal: Vec<f64>,
     /// Diagonal blocks, row by row: of reduced blocks, then of eliminated ones.
@@ -57,8 +57,7 @@ impl NormalEquations {
         let inverses = blocks - block_start[structure.reduced.len()];
         let column_starts = system.column_starts();
         Ok(Self {
-            residuals: vec![0.0; problem.layout.residuals],
-            jacobians: vec![0.0; problem.layout.jacobians],
+            linear: Linearisation::new(problem),
             gradient: vec![0.0; unknowns],
             diagonal: vec![0.0; unknowns],
             blocks: vec![0.0; blocks],
@@ -81,20 +80,27 @@ impl NormalEquations {
 
     /// Evaluates all factors at the problem's values; gives the cost.
     pub(super) fn linearise(&mut self, problem: &Problem) -> f64 {
-        let cost = problem.evaluate(&problem.numbers, &mut self.residuals, Some(&mut self.jacobians));
+        let cost = problem.linearise(&problem.numbers, &mut self.linear);
         if cost.is_finite() {
             self.sum();
         }
         cost
     }
 
+    /// Goes on with what was linearised elsewhere; what was held before is given back in its place.
+    pub(super) fn take(&mut self, linear: &mut Linearisation) {
+        std::mem::swap(&mut self.linear, linear);
+        self.sum();
+    }
+
     /// Sums diagonal blocks, gradient and ties; every sum is made by one task, in the order of the factors.
     fn sum(&mut self) {
         let reduced = self.structure.reduced.len();
         let variables = reduced + self.structure.eliminated.len();
-        let (structure, residuals, jacobians) = (&self.structure, &self.residuals, &self.jacobians);
+        let Linearisation { residuals, jacobians, .. } = &self.linear;
+        let structure = &self.structure;
         let (step_start, block_start) = (&self.step_start, &self.block_start);
-        let bounds: Vec<usize> = (0..variables).step_by(CHUNK).chain([variables]).collect();
+        let bounds = chunk_bounds(variables);
         let gradients = split(&mut self.gradient, bounds.iter().map(|at| step_start[*at]));
         let blocks = split(&mut self.blocks, bounds.iter().map(|at| block_start[*at]));
         gradients.into_par_iter().zip(blocks).enumerate().for_each(|(chunk, (gradient, blocks))| {
@@ -121,7 +127,7 @@ impl NormalEquations {
             }
         });
         let eliminated = structure.eliminated.len();
-        let bounds: Vec<usize> = (0..eliminated).step_by(CHUNK).chain([eliminated]).collect();
+        let bounds = chunk_bounds(eliminated);
         let first_number = |at: usize| structure.edge_start[structure.edges.start[at]];
         let ties = split(&mut self.ties, bounds.iter().map(|at| first_number(*at)));
         ties.into_par_iter().enumerate().for_each(|(chunk, ties)| {
@@ -170,7 +176,7 @@ impl NormalEquations {
         let structure = &self.structure;
         let reduced = structure.reduced.len();
         let eliminated = structure.eliminated.len();
-        let bounds: Vec<usize> = (0..eliminated).step_by(CHUNK).chain([eliminated]).collect();
+        let bounds = chunk_bounds(eliminated);
         let (step_start, block_start) = (&self.step_start, &self.block_start);
         let first_number = |at: usize| structure.edge_start[structure.edges.start[at]];
         let first_block = block_start[reduced];
@@ -222,7 +228,7 @@ impl NormalEquations {
 
     /// `S = H_rr − Σ W H_ee⁻¹ Wᵀ`: every block column is one task.
     fn reduce(&mut self, damping: f64) {
-        let (structure, jacobians) = (&self.structure, &self.jacobians);
+        let (structure, jacobians) = (&self.structure, &self.linear.jacobians);
         let (blocks, block_start) = (&self.blocks, &self.block_start);
         let (ties, solved_ties, diagonal) = (&self.ties, &self.solved_ties, &self.diagonal);
         let mut values = std::mem::take(&mut self.system.values);
@@ -327,15 +333,27 @@ impl NormalEquations {
         let reduced = structure.reduced.len();
         let (reduced_step, eliminated_step) = step.split_at_mut(rows);
         let (reduced_right, eliminated_right) = right.split_at(rows);
-        for at in 0..structure.eliminated.len() {
-            let size = structure.eliminated_sizes[at];
-            let begin = self.step_start[reduced + at] - rows;
-            let target = &mut eliminated_step[begin..begin + size];
-            multiply(self.inverse(at), &eliminated_right[begin..begin + size], size, 1, target);
+        let bounds = chunk_bounds(structure.eliminated.len());
+        let start = |at: usize| self.step_start[reduced + at] - rows;
+        let parts = split(eliminated_step, bounds.iter().map(|at| start(*at)));
+        parts.into_par_iter().enumerate().for_each(|(chunk, part)| {
+            let first = bounds[chunk];
+            for at in first..bounds[chunk + 1] {
+                let (begin, size) = (start(at), structure.eliminated_sizes[at]);
+                let target = &mut part[begin - start(first)..][..size];
+                multiply(self.inverse(at), &eliminated_right[begin..begin + size], size, 1, target);
+            }
+        });
+        let eliminated_step = &*eliminated_step;
+        let mut targets = Vec::with_capacity(reduced);
+        let mut rest = reduced_step;
+        for window in self.system.start.windows(2) {
+            let (target, tail) = rest.split_at_mut(window[1] - window[0]);
+            rest = tail;
+            targets.push(target);
         }
-        reduced_step.copy_from_slice(reduced_right);
-        for column in 0..reduced {
-            let target = &mut reduced_step[self.system.start[column]..self.system.start[column + 1]];
+        targets.into_par_iter().enumerate().with_min_len(CHUNK).for_each(|(column, target)| {
+            target.copy_from_slice(&reduced_right[self.system.start[column]..self.system.start[column + 1]]);
             for (at, edge) in structure.edges_of_reduced.of(column) {
                 let (at, edge) = (*at as usize, *edge as usize);
                 let begin = self.step_start[reduced + at] - rows;
@@ -349,7 +367,7 @@ impl NormalEquations {
                     }
                 }
             }
-        }
+        });
     }
 
     /// Steps of the eliminated variables from those of the reduced ones.
@@ -358,9 +376,13 @@ impl NormalEquations {
         let rows = self.system.rows();
         let reduced = structure.reduced.len();
         let (reduced_step, eliminated_step) = step.split_at_mut(rows);
-        for at in 0..structure.eliminated.len() {
+        let reduced_step = &*reduced_step;
+        let bounds = chunk_bounds(structure.eliminated.len());
+        let start = |at: usize| self.step_start[reduced + at] - rows;
+        let parts = split(eliminated_step, bounds.iter().map(|at| start(*at)));
+        let substitute = |first: usize, at: usize, part: &mut [f64]| {
             let size = structure.eliminated_sizes[at];
-            let begin = self.step_start[reduced + at] - rows;
+            let begin = start(at) - start(first);
             for edge in structure.edges.start[at]..structure.edges.start[at + 1] {
                 let column = structure.edges.items[edge] as usize;
                 let moved = &reduced_step[self.system.start[column]..self.system.start[column + 1]];
@@ -368,10 +390,13 @@ impl NormalEquations {
                 for k in 0..size {
                     let line = &solved[k * moved.len()..(k + 1) * moved.len()];
                     let sum: f64 = line.iter().zip(moved).map(|(entry, moved)| entry * moved).sum();
-                    eliminated_step[begin + k] -= sum;
+                    part[begin + k] -= sum;
                 }
             }
-        }
+        };
+        parts.into_par_iter().enumerate().for_each(|(chunk, part)| {
+            (bounds[chunk]..bounds[chunk + 1]).for_each(|at| substitute(bounds[chunk], at, part));
+        });
     }
 
     /// `H_ee⁻¹` of an eliminated variable, row by row, as [`NormalEquations::factorise`] left it.
@@ -401,6 +426,37 @@ impl NormalEquations {
         Some(self.step_start[place]..self.step_start[place + 1])
     }
 
+    /// `Jᵀ y` for a number `y` of each number of a residual.
+    pub(super) fn pull(&self, y: &[f64], into: &mut [f64]) {
+        let structure = &self.structure;
+        let reduced = structure.reduced.len();
+        let variables = reduced + structure.eliminated.len();
+        let bounds = chunk_bounds(variables);
+        let parts = split(into, bounds.iter().map(|at| self.step_start[*at]));
+        parts.into_par_iter().enumerate().for_each(|(chunk, part)| {
+            part.fill(0.0);
+            let first = bounds[chunk];
+            for variable in first..bounds[chunk + 1] {
+                let incidences = if variable < reduced {
+                    structure.incidences_of_reduced.of(variable)
+                } else {
+                    structure.incidences_of_eliminated.of(variable - reduced)
+                };
+                let range = self.step_start[variable]..self.step_start[variable + 1];
+                let size = range.len();
+                let target = &mut part[range.start - self.step_start[first]..][..size];
+                match size {
+                    6 => pull_fixed::<6>(incidences, y, &self.linear.jacobians, target),
+                    4 => pull_fixed::<4>(incidences, y, &self.linear.jacobians, target),
+                    3 => pull_fixed::<3>(incidences, y, &self.linear.jacobians, target),
+                    2 => pull_fixed::<2>(incidences, y, &self.linear.jacobians, target),
+                    5 => pull_fixed::<5>(incidences, y, &self.linear.jacobians, target),
+                    _ => pull_fixed::<1>(incidences, y, &self.linear.jacobians, target),
+                }
+            }
+        });
+    }
+
     /// `|J v|²` for a step `v`.
     pub(super) fn squared_change(&self, problem: &Problem, step: &[f64]) -> f64 {
         let mut sum = 0.0;
@@ -419,7 +475,7 @@ impl NormalEquations {
                             for variable in variables {
                                 let size = problem.freedom(*variable);
                                 if let Some(range) = self.step_of(variable.index()) {
-                                    let line = &self.jacobians[column..column + size];
+                                    let line = &self.linear.jacobians[column..column + size];
                                     change += line.iter().zip(&step[range]).map(|(j, s)| j * s).sum::<f64>();
                                 }
                                 column += size;
@@ -475,6 +531,25 @@ fn sum_diagonal<const N: usize>(
     }
     gradient.copy_from_slice(&side);
     block.copy_from_slice(sum.as_flattened());
+}
+
+/// Where the chunks of some variables begin, and where the last one ends.
+fn chunk_bounds(variables: usize) -> Vec<usize> {
+    (0..variables).step_by(CHUNK).chain([variables]).collect()
+}
+
+/// `Jᵀ y` of one variable.
+fn pull_fixed<const N: usize>(incidences: &[Incidence], y: &[f64], jacobians: &[f64], target: &mut [f64]) {
+    let mut sum = [0.0; N];
+    for Incidence { jacobian, residual, rows, columns, column } in incidences {
+        for k in 0..*rows as usize {
+            let from = jacobian + k * *columns as usize + *column as usize;
+            let line: &[f64; N] = jacobians[from..].first_chunk().unwrap_or(&[0.0; N]);
+            let factor = y[residual + k];
+            sum.iter_mut().zip(line).for_each(|(sum, entry)| *sum += entry * factor);
+        }
+    }
+    target.copy_from_slice(&sum);
 }
 
 /// Adds `J_eᵀ J_r` of one factor.
@@ -607,7 +682,7 @@ pub(super) fn dense_hessian(problem: &Problem, equations: &NormalEquations) -> D
                     if let Some(range) = equations.step_of(variable.index()) {
                         for (k, at) in range.enumerate() {
                             dense[(layout.residual_start + factor * layout.rows + row, at)] =
-                                equations.jacobians[column + k];
+                                equations.linear.jacobians[column + k];
                         }
                     }
                     column += size;

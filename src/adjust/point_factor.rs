@@ -27,17 +27,19 @@ impl<S: PointSight<R>, const R: usize> Factor for PointFactor<S, R> {
     fn evaluate(&self, values: &Values<'_>, residual: &mut [f64], jacobian: Option<&mut [f64]>) -> bool {
         let (pose, point) = (values.of(self.variables[0]), values.of(self.variables[1]));
         let r = rotation(pose);
-        let p = r * Vector3::new(point[0], point[1], point[2]) + translation(pose);
+        let t = translation(pose);
+        let along =
+            |row: usize| r[(row, 0)] * point[0] + r[(row, 1)] * point[1] + r[(row, 2)] * point[2] + t[row];
+        let p = Vector3::new(along(0), along(1), along(2));
         let Some((found, by_point)) = self.sight.look(&p) else { return false };
         residual.copy_from_slice(found.as_slice());
         if let Some(jacobian) = jacobian {
-            let by_world = by_point * r;
-            for row in 0..R {
-                let line = &mut jacobian[row * 9..(row + 1) * 9];
+            for (row, line) in jacobian.chunks_exact_mut(9).enumerate().take(R) {
                 write_pose_columns(&by_point, row, &p, line);
-                line[6] = by_world[(row, 0)];
-                line[7] = by_world[(row, 1)];
-                line[8] = by_world[(row, 2)];
+                let [a, b, c] = [by_point[(row, 0)], by_point[(row, 1)], by_point[(row, 2)]];
+                for column in 0..3 {
+                    line[6 + column] = a * r[(0, column)] + b * r[(1, column)] + c * r[(2, column)];
+                }
             }
         }
         true
@@ -52,9 +54,7 @@ pub(super) fn write_pose_columns<const R: usize>(
     p: &Vector3<f64>,
     line: &mut [f64],
 ) {
-    let j = Vector3::new(by_point[(row, 0)], by_point[(row, 1)], by_point[(row, 2)]);
+    let [x, y, z] = [by_point[(row, 0)], by_point[(row, 1)], by_point[(row, 2)]];
     // j · (ω × p) = ω · (p × j)
-    let turned = p.cross(&j);
-    line[..3].copy_from_slice(turned.as_slice());
-    line[3..6].copy_from_slice(j.as_slice());
+    line[..6].copy_from_slice(&[p.y * z - p.z * y, p.z * x - p.x * z, p.x * y - p.y * x, x, y, z]);
 }

@@ -36,8 +36,12 @@ impl PointSight<2> for PixelSight {
         let (x, y) = (p.x * inverse, p.y * inverse);
         let residual = SVector::<f64, 2>::new(self.pixel[0] - fx * x - cx, self.pixel[1] - fy * y - cy);
         let (a, b) = (-fx * inverse, -fy * inverse);
-        let jacobian = Matrix2x3::new(a, 0.0, -a * x, 0.0, b, -b * y);
-        Some((self.root * residual, self.root * jacobian))
+        // Written out: two by two is too small for a loop.
+        let w = &self.root;
+        let weighted = |u: f64, v: f64| [w[(0, 0)] * u + w[(0, 1)] * v, w[(1, 0)] * u + w[(1, 1)] * v];
+        let [r, s] = weighted(residual.x, residual.y);
+        let ([xx, yx], [xy, yy], [xz, yz]) = (weighted(a, 0.0), weighted(0.0, b), weighted(-a * x, -b * y));
+        Some((SVector::<f64, 2>::new(r, s), Matrix2x3::new(xx, xy, xz, yx, yy, yz)))
     }
 }
 

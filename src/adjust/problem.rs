@@ -1,10 +1,12 @@
 //! A non-linear least-squares problem: variables, and factors over them.
 
 use super::error::Error;
-use super::factor::{Batch, Factor, Kind, MOST_RESIDUALS};
+use super::factor::{Batch, Factor, Kind, LinearChunk, MOST_RESIDUALS};
+use super::linearisation::Linearisation;
 use super::loss::Loss;
 use super::parametrisation::{MOST_FREEDOM, Parametrisation};
 use rayon::prelude::*;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Factors that are evaluated together; costs are added chunk by chunk, so that the sum does not depend on threads.
@@ -54,6 +56,7 @@ pub struct Problem {
 #[derive(Default)]
 pub(super) struct Layout {
     pub(super) batches: Vec<BatchLayout>,
+    pub(super) factors: usize,
     pub(super) residuals: usize,
     pub(super) jacobians: usize,
 }
@@ -62,12 +65,21 @@ pub(super) struct Layout {
 pub(super) struct BatchLayout {
     pub(super) residual_start: usize,
     pub(super) jacobian_start: usize,
+    /// Place of the first factor among all.
+    pub(super) factor_start: usize,
     pub(super) rows: usize,
     pub(super) columns: usize,
     /// Variables of one factor.
     pub(super) arity: usize,
     /// Variables of all factors, one after the other.
     pub(super) variables: Vec<Variable>,
+}
+
+impl BatchLayout {
+    /// Factors of the batch.
+    pub(super) fn factors(&self) -> usize {
+        self.variables.len() / self.arity.max(1)
+    }
 }
 
 impl Problem {
@@ -152,11 +164,13 @@ impl Problem {
         let layout = BatchLayout {
             residual_start: self.layout.residuals,
             jacobian_start: self.layout.jacobians,
+            factor_start: self.layout.factors,
             rows: F::RESIDUALS,
             columns,
             arity,
             variables,
         };
+        self.layout.factors += kind.len();
         self.layout.residuals += kind.len() * F::RESIDUALS;
         self.layout.jacobians += kind.len() * F::RESIDUALS * columns;
         self.layout.batches.push(layout);
@@ -190,53 +204,56 @@ impl Problem {
     /// The cost `½ Σ ρ` where the variables are; infinite where a factor has no residual.
     #[must_use]
     pub fn cost(&self) -> f64 {
-        let mut residuals = vec![0.0; self.layout.residuals];
-        self.evaluate(&self.numbers, &mut residuals, None)
+        self.cost_at(&self.numbers)
     }
 
-    /// Evaluates every factor at some numbers; gives the cost.
-    pub(super) fn evaluate(
-        &self,
-        numbers: &[f64],
-        residuals: &mut [f64],
-        jacobians: Option<&mut [f64]>,
-    ) -> f64 {
+    /// The cost `½ Σ ρ` at some numbers; infinite where a factor has no residual.
+    pub(super) fn cost_at(&self, numbers: &[f64]) -> f64 {
         let values = Values { numbers, start: &self.start };
         let mut cost = 0.0;
-        let (mut residuals, mut jacobians) = (residuals, jacobians);
+        for batch in &self.batches {
+            let chunks = 0..batch.len().div_ceil(CHUNK);
+            let of = |chunk: usize| batch.cost(range_of(chunk, batch.len()), &values);
+            cost += chunks.into_par_iter().map(of).collect::<Vec<f64>>().iter().sum::<f64>();
+        }
+        if cost.is_nan() { f64::INFINITY } else { cost }
+    }
+
+    /// Linearises every factor at some numbers; gives the cost.
+    pub(super) fn linearise(&self, numbers: &[f64], into: &mut Linearisation) -> f64 {
+        let values = Values { numbers, start: &self.start };
+        let mut cost = 0.0;
+        let Linearisation { residuals, jacobians, roots } = into;
+        let (mut residuals, mut jacobians, mut roots) =
+            (&mut residuals[..], &mut jacobians[..], &mut roots[..]);
         for (batch, layout) in self.batches.iter().zip(&self.layout.batches) {
-            let (head, tail) = residuals.split_at_mut(batch.len() * layout.rows);
-            residuals = tail;
             let size = layout.rows * layout.columns;
-            let of_chunk = |index: usize| index * CHUNK..((index + 1) * CHUNK).min(batch.len());
-            let costs: Vec<f64> = match jacobians {
-                Some(all) => {
-                    let (mine, tail) = all.split_at_mut(batch.len() * size);
-                    jacobians = Some(tail);
-                    if size == 0 {
-                        continue;
-                    }
-                    head.par_chunks_mut(CHUNK * layout.rows)
-                        .zip(mine.par_chunks_mut(CHUNK * size))
-                        .enumerate()
-                        .map(|(index, (residuals, jacobians))| {
-                            batch.evaluate(
-                                of_chunk(index),
-                                &values,
-                                residuals,
-                                Some((jacobians, layout.columns)),
-                            )
-                        })
-                        .collect()
-                }
-                None => head
-                    .par_chunks_mut(CHUNK * layout.rows)
-                    .enumerate()
-                    .map(|(index, residuals)| batch.evaluate(of_chunk(index), &values, residuals, None))
-                    .collect(),
-            };
+            let (my_residuals, tail) = residuals.split_at_mut(batch.len() * layout.rows);
+            residuals = tail;
+            let (my_jacobians, tail) = jacobians.split_at_mut(batch.len() * size);
+            jacobians = tail;
+            let (my_roots, tail) = roots.split_at_mut(batch.len());
+            roots = tail;
+            if size == 0 {
+                continue;
+            }
+            let costs: Vec<f64> = my_residuals
+                .par_chunks_mut(CHUNK * layout.rows)
+                .zip(my_jacobians.par_chunks_mut(CHUNK * size))
+                .zip(my_roots.par_chunks_mut(CHUNK))
+                .enumerate()
+                .map(|(chunk, ((residuals, jacobians), roots))| {
+                    let into = LinearChunk { residuals, jacobians, roots };
+                    batch.linearise(range_of(chunk, batch.len()), &values, into)
+                })
+                .collect();
             cost += costs.iter().sum::<f64>();
         }
         if cost.is_nan() { f64::INFINITY } else { cost }
     }
+}
+
+/// Factors of a chunk.
+fn range_of(chunk: usize, factors: usize) -> Range<usize> {
+    chunk * CHUNK..((chunk + 1) * CHUNK).min(factors)
 }

@@ -2,6 +2,7 @@
 
 use super::estimation::Estimation;
 use super::grouping::Grouping;
+use super::linearisation::Linearisation;
 use super::normal_equations::{NormalEquations, dense_hessian};
 use super::observations::Observations;
 use super::scene::Scene;
@@ -27,9 +28,9 @@ fn estimation(graph: &FactorGraph, options: &Options) -> Estimation {
 /// Largest difference between Jacobians and central differences, relative to the largest entry.
 fn jacobian_error(problem: &Problem) -> f64 {
     let (rows, step) = (problem.layout.residuals, 1e-6);
-    let mut residuals = vec![0.0; rows];
-    let mut jacobians = vec![0.0; problem.layout.jacobians];
-    problem.evaluate(&problem.numbers, &mut residuals, Some(&mut jacobians));
+    let mut linear = Linearisation::new(problem);
+    problem.linearise(&problem.numbers, &mut linear);
+    let jacobians = linear.jacobians;
     let mut analytic = std::collections::BTreeMap::new();
     for layout in &problem.layout.batches {
         for (factor, variables) in layout.variables.chunks_exact(layout.arity).enumerate() {
@@ -57,9 +58,9 @@ fn jacobian_error(problem: &Problem) -> f64 {
                 let mut numbers = problem.numbers.clone();
                 let range = problem.start[index]..problem.start[index + 1];
                 space.plus(&problem.numbers[range.clone()], &delta, &mut numbers[range]);
-                let mut residuals = vec![0.0; rows];
-                assert!(problem.evaluate(&numbers, &mut residuals, None).is_finite());
-                residuals
+                let mut linear = Linearisation::new(problem);
+                assert!(problem.linearise(&numbers, &mut linear).is_finite());
+                linear.residuals
             };
             let (after, before) = (at(1.0), at(-1.0));
             for row in 0..rows {

@@ -3,6 +3,7 @@
 use super::covariances::Covariances;
 use super::error::Error;
 use super::grouping::Grouping;
+use super::iterations::iterations;
 use super::line_factor::LineFactor;
 use super::line_form::{CayleySpace, EndpointsSpace, LineForm};
 use super::loss::Loss;
@@ -20,7 +21,7 @@ use super::shared_line::{ParallelFactor, RightAngleFactor, SharedLineFactor, sha
 use super::summary::Summary;
 use super::whitening::{ends_depth_sight, ends_sight, root};
 use crate::geometry::{PluckerLine, Segment};
-use crate::structure::{Estimate, Iteration, MapLine, MapPoint, PoseRow, TrajectoryPose};
+use crate::structure::{Estimate, MapLine, MapPoint, PoseRow, TrajectoryPose};
 use nalgebra::{DMatrix, Matrix3, Matrix3x4, Matrix6, Point2, Point3, SMatrix, Vector3, Vector6};
 use std::marker::PhantomData;
 use std::sync::Arc;
@@ -410,23 +411,13 @@ impl Estimation {
             let row = MapLine::new(name.clone(), line.line_id, &line.segment);
             MapLine { covariance: of_line.next(), ..row }
         });
-        let iterations = (0..).zip(steps).map(|(iteration, step)| Iteration {
-            estimate: name.clone(),
-            iteration,
-            cost: step.cost,
-            cost_change: (iteration > 0 && step.decrease.is_finite()).then_some(step.decrease),
-            gradient_max: step.gradient_max,
-            step_norm: (iteration > 0).then_some(step.step_norm),
-            damping: step.damping,
-            accepted: step.accepted,
-        });
         Ok(Estimate {
             name: name.clone(),
             trajectory: trajectory.collect(),
             points: points.collect(),
             lines: lines.collect(),
             tracking: Vec::new(),
-            iterations: iterations.collect(),
+            iterations: iterations(&name, steps),
         })
     }
 }

@@ -14,6 +14,7 @@
 //! passed-over lines are counted.
 
 mod element;
+mod estimated;
 mod export;
 mod import;
 mod information;
@@ -22,6 +23,7 @@ mod tests;
 mod text;
 
 pub use element::{G2oElement, G2oGraph, G2oKind};
+pub use estimated::with_estimate;
 pub use export::{G2oForm, to_g2o};
 pub use import::from_g2o;
 pub use text::{read_g2o, write_g2o};

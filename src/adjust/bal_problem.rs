@@ -165,3 +165,134 @@ fn parts(bundle: &BalBundle) -> usize {
     }
     (0..parent.len()).filter(|at| is_seen[*at] && parent[*at] == *at).count()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::scene::Draw;
+    use super::super::tests::{DIFFERENCES, jacobian_error};
+    use super::*;
+    use crate::geometry::Pose;
+    use nalgebra::{Point3, Vector6};
+    use proptest::prelude::*;
+
+    /// The image of a point by the formulas of BAL's page.
+    fn project(camera: &[f64; 9], point: &[f64; 3]) -> [f64; 2] {
+        let [a, b, c, x, y, z, focal, k1, k2] = *camera;
+        let turn = Pose::exp(&Vector6::new(a, b, c, 0.0, 0.0, 0.0)).rotation();
+        let seen = Pose::new(turn, [x, y, z].into()) * Point3::from(*point);
+        let p = [-seen.x / seen.z, -seen.y / seen.z];
+        let squared = p[0] * p[0] + p[1] * p[1];
+        p.map(|part| focal * (1.0 + k1 * squared + k2 * squared * squared) * part)
+    }
+
+    /// Cameras around points, each of which all cameras see without noise.
+    fn exact() -> BalBundle {
+        let mut draw = Draw::new(3);
+        let points: Vec<[f64; 3]> = (0..40).map(|_| draw.vector(1.0).into()).collect();
+        let cameras: Vec<[f64; 9]> = (0..5)
+            .map(|at| {
+                let (turn, shift) = (draw.vector(0.2), draw.vector(0.3));
+                let away = 0.4 * f64::from(at);
+                [
+                    turn.x,
+                    away + turn.y,
+                    turn.z,
+                    shift.x,
+                    shift.y,
+                    shift.z - 4.0,
+                    500.0 + 9.0 * away,
+                    -0.02,
+                    0.003,
+                ]
+            })
+            .collect();
+        let views = (0..cameras.len()).flat_map(|camera| (0..points.len()).map(move |point| (camera, point)));
+        let views = views
+            .map(|(camera, point)| BalView {
+                camera,
+                point,
+                pixel: project(&cameras[camera], &points[point]),
+            })
+            .collect();
+        BalBundle { cameras, points, views }
+    }
+
+    fn adjusted(bundle: &BalBundle) -> Result<BalAdjusted, Error> {
+        adjust_bal(bundle, Loss::None, &SolverOptions::default(), &mut |_| true)
+    }
+
+    proptest! {
+        #[test]
+        fn residuals_are_those_of_the_page_and_jacobians_their_derivatives(
+            turn in prop::array::uniform3(-1.0..1.0_f64), [x, y, z] in prop::array::uniform3(-1.0..1.0_f64),
+            point in prop::array::uniform3(-1.0..1.0_f64), [k1, k2] in prop::array::uniform2(-0.3..0.3_f64),
+            pixel in prop::array::uniform2(-300.0..300.0_f64),
+        ) {
+            let camera = [turn[0], turn[1], turn[2], x, y, z - 5.0, 600.0, k1, k2];
+            let bundle = BalBundle {
+                cameras: vec![camera],
+                points: vec![point],
+                views: vec![BalView { camera: 0, point: 0, pixel }],
+            };
+            let problem = Posed::of(&bundle, Loss::None, &mut Summary::default()).unwrap().problem;
+            let seen = project(&camera, &point);
+            let expected = 0.5 * ((seen[0] - pixel[0]).powi(2) + (seen[1] - pixel[1]).powi(2));
+            prop_assert!((problem.cost() - expected).abs() < 1e-9 * (1.0 + expected), "{} {expected}", problem.cost());
+            prop_assert!(jacobian_error(&problem) < DIFFERENCES);
+        }
+    }
+
+    #[test]
+    fn cameras_with_their_lenses_are_recovered_from_exact_pixels() {
+        let truth = exact();
+        let mut draw = Draw::new(7);
+        let mut start = truth.clone();
+        for camera in &mut start.cameras {
+            camera.iter_mut().take(6).for_each(|number| *number += 0.02 * draw.uniform());
+            camera[6] *= 1.0 + 0.05 * draw.uniform();
+            (camera[7], camera[8]) = (0.0, 0.0);
+        }
+        start.points.iter_mut().flatten().for_each(|number| *number += 0.02 * draw.uniform());
+        let found = adjusted(&start).unwrap();
+        assert!(found.summary.initial_cost > 1e3 && found.summary.final_cost < 1e-12, "{:?}", found.summary);
+        // Gauge apart, intrinsics are what they were.
+        for (camera, truth) in found.cameras.iter().zip(&truth.cameras) {
+            assert!((camera[6] - truth[6]).abs() < 1e-4 * truth[6], "{camera:?} {truth:?}");
+            assert!(
+                (camera[7] - truth[7]).abs() + (camera[8] - truth[8]).abs() < 1e-4,
+                "{camera:?} {truth:?}"
+            );
+        }
+        let summary = &found.summary;
+        assert_eq!((summary.poses.used, summary.points.used, summary.point_factors.used), (5, 40, 200));
+        assert_eq!((summary.residuals, summary.unknowns, summary.components), (400, 165, 1));
+        assert_eq!(found.steps.len(), summary.iterations + 1);
+    }
+
+    #[test]
+    fn what_nobody_sees_stays_where_it_is_to_the_last_bit() {
+        let mut bundle = exact();
+        let (camera, point) = ([0.1, 0.2, 3.0, 1.0, 2.0, 3.0, 400.0, 0.5, 0.25], [7.0, 8.0, 9.0]);
+        bundle.cameras.push(camera);
+        bundle.points.push(point);
+        bundle.points[0][0] += 0.01;
+        let found = adjusted(&bundle).unwrap();
+        assert_eq!((found.cameras[5], found.points[40]), (camera, point));
+        assert_eq!(found.summary.unconstrained, [FrameId(5)]);
+        assert_eq!(found.summary.points.excluded.get(&Reason::TooFewViews), Some(&1));
+        assert_eq!(found.summary.components, 1);
+    }
+
+    #[test]
+    fn bundles_that_are_none_are_refused() {
+        let mut bundle = exact();
+        bundle.views[3].point = 40;
+        let expected = "a camera and a point of the bundle";
+        assert_eq!(adjusted(&bundle).unwrap_err(), Error::Factor { factor: 3, expected });
+        bundle.views.clear();
+        assert!(matches!(adjusted(&bundle).unwrap_err(), Error::Nothing { .. }));
+        let mut bundle = exact();
+        bundle.points[2] = [f64::NAN; 3];
+        assert!(matches!(adjusted(&bundle).unwrap_err(), Error::Start { .. }));
+    }
+}

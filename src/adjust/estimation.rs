@@ -11,18 +11,17 @@ use super::minimise::Step;
 use super::observations::Observations;
 use super::options::{LineKind, Method, Options, Parallelism};
 use super::parametrisation::{DirectionSpace, LineSpace, Parametrisation, PoseSpace, VectorSpace};
-use super::planar_pose::{PLANE, PlanarPoseFactor, PlanarPoseSpace};
+use super::planar_pose::PlanarPoseSpace;
 use super::point_handle::PointHandle;
 use super::pose_factor::{PosePriorFactor, ScaleFactor};
 use super::problem::{Problem, Variable};
-use super::relative_pose_factor::RelativePoseFactor;
 use super::scale_gauge::ONE_PLACE_M;
 use super::shared_line::{ParallelFactor, RightAngleFactor, SharedLineFactor, shared_plucker};
 use super::summary::Summary;
-use super::whitening::{ends_depth_sight, ends_sight, root};
+use super::whitening::{ends_depth_sight, ends_sight};
 use crate::geometry::{PluckerLine, Segment};
 use crate::structure::{Estimate, MapLine, MapPoint, PoseRow, TrajectoryPose};
-use nalgebra::{DMatrix, Matrix3, Matrix3x4, Matrix6, Point2, Point3, SMatrix, Vector3, Vector6};
+use nalgebra::{Matrix3x4, Matrix6, Point2, Point3, SMatrix, Vector3, Vector6};
 use std::marker::PhantomData;
 use std::sync::Arc;
 
@@ -172,31 +171,6 @@ impl Estimation {
             sigma_rad: RIGHT_ANGLE_RAD,
         });
         self.problem.add_factors(right_angles.collect(), Loss::None)
-    }
-
-    fn add_relatives(&mut self, observations: &Observations, options: &Options) -> Result<(), Error> {
-        let (mut planar, mut spatial) = (Vec::new(), Vec::new());
-        for view in &observations.relatives {
-            let variables = [self.poses[view.frame], self.poses[view.other]];
-            if observations.planar {
-                let information = view.information.as_ref();
-                let information = information.map_or_else(
-                    || DMatrix::identity(3, 3),
-                    |all| DMatrix::from_fn(3, 3, |row, column| all[(PLANE[row], PLANE[column])]),
-                );
-                let root = root(&information)
-                    .map_or_else(Matrix3::zeros, |root| root.fixed_view::<3, 3>(0, 0).into_owned());
-                planar.push(PlanarPoseFactor::new(variables, &view.frame_from_other, &root));
-            } else {
-                let root = view.information.as_ref().map_or_else(Matrix6::identity, |information| {
-                    let root = root(information);
-                    root.map_or_else(Matrix6::zeros, |root| root.fixed_view::<6, 6>(0, 0).into_owned())
-                });
-                spatial.push(RelativePoseFactor::new(variables, &view.frame_from_other, &root));
-            }
-        }
-        self.problem.add_factors(planar, options.loss)?;
-        self.problem.add_factors(spatial, options.loss)
     }
 
     fn add_priors(&mut self, observations: &Observations, options: &Options) -> Result<(), Error> {

@@ -35,6 +35,7 @@ mod pose_factor;
 mod problem;
 mod reduced_system;
 mod relative_pose_factor;
+mod relative_poses;
 mod scale_gauge;
 mod shared_line;
 mod summary;

@@ -2,7 +2,8 @@
 
 use super::error::Error;
 use super::options::{Method, Options};
-use super::planar_pose::{PLANE, is_planar};
+use super::planar_pose::is_planar;
+use super::relative_poses::{RelativeView, relative_view};
 use super::summary::{Reason, Summary, Tally};
 use super::whitening::root as information_root;
 use crate::geometry::{PinholeCamera, PluckerLine, Pose, Segment, line_residual};
@@ -57,29 +58,6 @@ pub(super) struct LineView {
     pub(super) depths: [Option<f64>; 2],
     /// Over the four coordinates, and the depths where there are any.
     pub(super) information: Option<DMatrix<f64>>,
-}
-
-/// A frame as seen from another.
-#[derive(Clone, Debug)]
-pub(super) struct RelativeView {
-    pub(super) frame: usize,
-    pub(super) other: usize,
-    pub(super) frame_from_other: Pose,
-    pub(super) information: Option<DMatrix<f64>>,
-}
-
-impl RelativeView {
-    /// Whether it keeps the plane and says nothing of what leaves it.
-    fn is_planar(&self) -> bool {
-        let is_outside = |row: usize| !PLANE.contains(&row);
-        is_planar(&self.frame_from_other)
-            && self.information.as_ref().is_some_and(|information| {
-                let mut places = (0..6).flat_map(|row| (0..6).map(move |column| (row, column)));
-                places.all(|(row, column)| {
-                    information[(row, column)] == 0.0 || !(is_outside(row) || is_outside(column))
-                })
-            })
-    }
 }
 
 /// What can be used of a graph.
@@ -398,20 +376,12 @@ fn squeeze<T>(list: &mut Vec<T>, marked: &[bool], tally: &mut Tally) -> Vec<usiz
     places
 }
 
-fn relative_view(factor: &GraphFactor, frames: &BTreeMap<FrameId, usize>) -> Result<RelativeView, Reason> {
-    let [tx, ty, tz, qx, qy, qz, qw] = factor.measurement[..] else { return Err(Reason::NotFinite) };
-    let pose = Pose::from_components([tx, ty, tz], [qx, qy, qz, qw]).map_err(|_| Reason::NotFinite)?;
-    let place = |id: Option<FrameId>| id.and_then(|id| frames.get(&id).copied()).ok_or(Reason::UnknownVertex);
-    let (frame, other) = (place(factor.frame_id)?, place(factor.other_frame_id)?);
-    if frame == other {
-        return Err(Reason::UnknownVertex);
-    }
-    let information = information(factor, 6, 6)?;
-    Ok(RelativeView { frame, other, frame_from_other: pose, information })
-}
-
 /// The information matrix of a factor over its first `used` numbers; the others are left open, not held.
-fn information(factor: &GraphFactor, size: usize, used: usize) -> Result<Option<DMatrix<f64>>, Reason> {
+pub(super) fn information(
+    factor: &GraphFactor,
+    size: usize,
+    used: usize,
+) -> Result<Option<DMatrix<f64>>, Reason> {
     let Some(numbers) = &factor.information else { return Ok(None) };
     if numbers.len() != size * (size + 1) / 2 || !numbers.iter().all(|number| number.is_finite()) {
         return Err(Reason::BadInformation);

@@ -117,6 +117,15 @@ fn run_g2o(args: &Args, as_file: bool, stdout: &mut dyn Write) -> anyhow::Result
     let has_points = graph.factors.iter().any(|factor| factor.kind == registry::POINT_REPROJECTION);
     let options = args.options(if has_points { Method::Point } else { Method::PoseGraph });
     let outcome = told(&remarks)?;
+    let idle = match options.method {
+        Method::PoseGraph => ("points in frames", registry::POINT_REPROJECTION),
+        _ => ("relative poses", registry::RELATIVE_POSE),
+    };
+    let idle_count = graph.factors.iter().filter(|factor| factor.kind == idle.1).count();
+    if idle_count > 0 {
+        let (count, method) = (text::count(idle_count as u64), options.method.name());
+        writeln!(io::stderr(), "note: {count} {} have no part in the method {method}", idle.0)?;
+    }
     let adjusted = args.watched(|watch| adjust_watched(&graph, &options, watch))?;
     let Adjusted { estimate, summary } = adjusted;
     let outcome = args.outcome(&summary, outcome)?;

@@ -20,7 +20,7 @@ use std::time::Instant;
 use open_structure::adjust::{
     BalBundle, BalView, Loss, Method, Options, SolverOptions, Step, Summary, adjust_bal, adjust_watched,
 };
-use open_structure::exchange::{ImportNames, from_g2o, read_bal, read_g2o};
+use open_structure::exchange::{BalCamera, ImportNames, from_g2o, read_bal, read_g2o};
 use open_structure::format;
 use open_structure::structure::{FactorGraph, Sequence};
 
@@ -73,7 +73,7 @@ fn read(path: &Path, method: &str) -> Input {
         let problem = read_bal(open()).expect("a problem of BAL");
         let views = problem.observations.iter();
         return Input::Bal(BalBundle {
-            cameras: problem.cameras.iter().map(|camera| camera.numbers()).collect(),
+            cameras: problem.cameras.iter().map(BalCamera::numbers).collect(),
             points: problem.points,
             views: views
                 .map(|seen| BalView { camera: seen.camera, point: seen.point, pixel: seen.pixel })

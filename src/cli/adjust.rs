@@ -14,6 +14,7 @@ use crate::adjust::{
     Adjusted, Eliminate, Error, Factorisation, LineKind, Loss, Method, Optimiser, Options, Parallelism,
     PointForm, SolverOptions, Step, Summary, adjust_watched,
 };
+use crate::format;
 use crate::structure::{Estimate, FactorGraph, FrameId, Sequence};
 
 /// Adjust a factor graph: move poses and landmarks to where the measurements agree best.

@@ -75,10 +75,10 @@ impl Estimation {
             } else {
                 let root = view.information.as_ref().map_or_else(Matrix6::identity, |information| {
                     let whole = Cholesky::new(information.fixed_view::<6, 6>(0, 0).into_owned());
-                    whole.map(|factor| factor.l().transpose()).unwrap_or_else(|| {
-                        let root = root(information);
-                        root.map_or_else(Matrix6::zeros, |root| root.fixed_view::<6, 6>(0, 0).into_owned())
-                    })
+                    let whole = whole.map(|factor| factor.l().transpose());
+                    whole
+                        .or_else(|| Some(root(information)?.fixed_view::<6, 6>(0, 0).into_owned()))
+                        .unwrap_or_default()
                 });
                 spatial.push(RelativePoseFactor::new(variables, &view.frame_from_other, &root));
             }

@@ -257,17 +257,16 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     if let Some(from) = args.from.map_or_else(|| foreign::of(&args.input), |from| Ok(Some(from)))? {
         return adjust_foreign::run(args, from, stdout);
     }
-    adjust_foreign::refuse_output_of_others(&args.output)?;
-    let mut read = extended::read(&args.input, &args.output, args.force);
-    if args.input.is_file() && !args.input.extension().is_some_and(|extension| extension == "mcap") {
-        read = read.with_context(|| {
+    if args.input.is_file() && args.input.extension().is_none_or(|extension| extension != "mcap") {
+        format::open(&args.input).map(drop).with_context(|| {
             let input = args.input.display();
             format!(
                 "{input}: not known as a graph of g2o or a problem of BAL; if it is one, say so with --from"
             )
-        });
+        })?;
     }
-    let (mut sequence, mut outcome) = read?;
+    adjust_foreign::refuse_output_of_others(&args.output)?;
+    let (mut sequence, mut outcome) = extended::read(&args.input, &args.output, args.force)?;
     extended::check_cameras(&sequence)?;
     let options = args.options(Method::default());
     let name = options.estimate_name().to_owned();

@@ -108,7 +108,7 @@ fn refuse_idle(args: &Args, from: Foreign, as_file: bool) -> anyhow::Result<()> 
 }
 
 fn run_g2o(args: &Args, as_file: bool, stdout: &mut dyn Write) -> anyhow::Result<Outcome> {
-    let model = read(&args.input, |input| read_g2o(input))?;
+    let model = read(&args.input, read_g2o)?;
     let names = names(args)?;
     let Imported { mut sequence, remarks } =
         from_g2o(&model, &names).with_context(|| args.input.display().to_string())?;
@@ -116,7 +116,7 @@ fn run_g2o(args: &Args, as_file: bool, stdout: &mut dyn Write) -> anyhow::Result
         .with_context(|| format!("{}: has no vertices and edges", args.input.display()))?;
     let has_points = graph.factors.iter().any(|factor| factor.kind == registry::POINT_REPROJECTION);
     let options = args.options(if has_points { Method::Point } else { Method::PoseGraph });
-    let outcome = told(&remarks)?;
+    let outcome = told(&remarks, as_file)?;
     let idle = match options.method {
         Method::PoseGraph => ("points in frames", registry::POINT_REPROJECTION),
         _ => ("relative poses", registry::RELATIVE_POSE),
@@ -142,7 +142,7 @@ fn run_g2o(args: &Args, as_file: bool, stdout: &mut dyn Write) -> anyhow::Result
 }
 
 fn run_bal(args: &Args, as_file: bool, stdout: &mut dyn Write) -> anyhow::Result<Outcome> {
-    let problem = read(&args.input, |input| read_bal(input))?;
+    let problem = read(&args.input, read_bal)?;
     let names = names(args)?;
     let bundle = BalBundle {
         cameras: problem.cameras.iter().map(BalCamera::numbers).collect(),
@@ -170,7 +170,7 @@ fn run_bal(args: &Args, as_file: bool, stdout: &mut dyn Write) -> anyhow::Result
         let initial = BalProblem { cameras: cameras.collect(), ..problem };
         let Imported { mut sequence, remarks } =
             from_bal(&initial, &names).with_context(|| args.input.display().to_string())?;
-        if told(&remarks)? == Outcome::Findings {
+        if told(&remarks, as_file)? == Outcome::Findings {
             outcome = Outcome::Findings;
         }
         sequence.manifest.source.files = source_files(vec![args.input.clone()])?;
@@ -196,10 +196,10 @@ fn read<T>(
     parse(open).with_context(|| path.display().to_string())
 }
 
-/// Says what was left out or changed on the way in.
-fn told(remarks: &[Remark]) -> anyhow::Result<Outcome> {
+/// Says what was left out on the way in and, where a sequence is written, what is said in another way there.
+fn told(remarks: &[Remark], as_file: bool) -> anyhow::Result<Outcome> {
     let mut outcome = Outcome::Done;
-    for remark in remarks {
+    for remark in remarks.iter().filter(|remark| remark.loss || !as_file) {
         let word = if remark.loss { "warning" } else { "note" };
         writeln!(io::stderr(), "{word}: {remark}")?;
         if remark.loss {

@@ -42,7 +42,7 @@ fn small(folder: &TempDir) -> PathBuf {
     path
 }
 
-/// `½ Σ eᵀ Ω e` of a pose graph by g2o's own error, `[t; vec q]` of `Z⁻¹ Xi⁻¹ Xj`, from the words of the file.
+/// `½ Σ eᵀ Ω e` of a pose graph with `e = [t; 2 vec q]` of `Z⁻¹ Xi⁻¹ Xj`, from the words of the file.
 fn cost_of_file(text: &str) -> (usize, f64) {
     use std::collections::BTreeMap;
     let pose = |words: &[f64]| {
@@ -61,13 +61,13 @@ fn cost_of_file(text: &str) -> (usize, f64) {
                 let numbers = numbers(3);
                 let found = vertices[words[1]].inverse() * vertices[words[2]];
                 let (t, [x, y, z, w]) = (pose(&numbers).inverse() * found).components();
-                let sign = if w < 0.0 { -1.0 } else { 1.0 };
-                let error = [t[0], t[1], t[2], sign * x, sign * y, sign * z];
+                let twice = if w < 0.0 { -2.0 } else { 2.0 };
+                let error = [t[0], t[1], t[2], twice * x, twice * y, twice * z];
                 let mut places = (0..6).flat_map(|row| (row..6).map(move |column| (row, column)));
                 for number in &numbers[7..] {
                     let (row, column) = places.next().unwrap();
-                    let twice = if row == column { 0.5 } else { 1.0 };
-                    cost += twice * number * error[row] * error[column];
+                    let both = if row == column { 0.5 } else { 1.0 };
+                    cost += both * number * error[row] * error[column];
                 }
                 edges += 1;
             }
@@ -125,10 +125,10 @@ fn second_edges(text: &str) -> usize {
     text.lines().filter(|line| line.starts_with("EDGE")).count()
 }
 
-/// The cost of a pose graph by our registry's residual is, near a solution, that of g2o: a graph is put at its own
+/// The cost of a pose graph by our registry's residual is, near a solution, that of the file: a graph is put at its own
 /// measurements along a chain, so that all errors are small.
 #[test]
-fn information_of_a_real_graph_weighs_as_g2o_does() {
+fn information_of_a_real_graph_weighs_as_its_file_does() {
     let Some(path) = shared("pose-graphs/sphere2500.g2o") else { return };
     let graph = read_g2o(fs::read(&path).unwrap().as_slice()).unwrap();
     let imported = from_g2o(&graph, &names()).unwrap();

@@ -21,6 +21,14 @@ pub enum Error {
         /// The loss.
         loss: Loss,
     },
+    /// A space with degrees of freedom that the solver has no blocks for.
+    #[error("a space of {found} degrees of freedom: expected 1 to {most}")]
+    Freedom {
+        /// Most degrees of freedom.
+        most: usize,
+        /// Those of the space.
+        found: usize,
+    },
     /// An option outside its range.
     #[error("option {option}: expected {expected}, found {found}")]
     Option {

@@ -1,6 +1,9 @@
 //! A factor graph into an estimate: bundle adjustment, structural adjustment and pose graphs.
 
 mod adjustment;
+mod bal_camera;
+mod bal_factor;
+mod bal_problem;
 mod block_pattern;
 mod bound;
 mod covariances;
@@ -10,6 +13,7 @@ mod estimation;
 mod factor;
 mod grouping;
 mod inverse_depth;
+mod iterations;
 mod line_factor;
 mod line_form;
 mod line_sight;
@@ -24,6 +28,7 @@ mod panels;
 mod parallax_point;
 mod parametrisation;
 mod plan;
+mod planar_pose;
 mod point_factor;
 mod point_handle;
 mod point_sight;
@@ -32,6 +37,8 @@ mod problem;
 mod reduced_system;
 mod refinement;
 mod region;
+mod relative_pose_factor;
+mod relative_poses;
 mod scale_gauge;
 mod settle;
 mod shared_line;
@@ -41,9 +48,12 @@ mod uncertainty;
 mod whitening;
 
 pub use adjustment::{Adjusted, adjust, adjust_watched};
+pub use bal_camera::BalCameraSpace;
+pub use bal_problem::{BalAdjusted, BalBundle, BalView, adjust_bal};
 pub use bound::{Alignment, Bound, bound};
 pub use error::Error;
 pub use factor::{Factor, MOST_RESIDUALS};
+pub use iterations::iterations;
 pub use loss::Loss;
 pub use minimise::{Ending, Minimum, Optimiser, SolverOptions, Step, minimise, minimise_watched};
 pub use options::{LineKind, Method, Options, Parallelism, PointForm, PosePrior};
@@ -51,6 +61,7 @@ pub use parametrisation::{
     DirectionSpace, LineSpace, MOST_FREEDOM, Parametrisation, PoseSpace, RotationSpace, VectorSpace,
 };
 pub use plan::{Choice, Eliminate, Factorisation, Plan};
+pub use planar_pose::PlanarPoseSpace;
 pub use problem::{Problem, Values, Variable};
 pub use summary::{Reason, ReleasedLine, Summary, Tally};
 

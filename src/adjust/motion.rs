@@ -3,7 +3,8 @@
 use super::elimination::for_each_factor;
 use super::estimation::Estimation;
 use super::linearisation::Linearisation;
-use super::observations::{Observations, RelativeView};
+use super::observations::Observations;
+use super::relative_poses::RelativeView;
 use crate::structure::FrameId;
 use nalgebra::{DMatrix, DVector, Matrix6, SymmetricEigen, Vector6};
 use std::collections::BTreeMap;

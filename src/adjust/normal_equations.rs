@@ -4,6 +4,7 @@ use super::elimination::{Elimination, Incidence, Pair, Place};
 use super::error::Error;
 use super::linearisation::Linearisation;
 use super::minimise::SolverOptions;
+use super::parametrisation::MOST_FREEDOM;
 use super::plan::Plan;
 use super::problem::Problem;
 use super::reduced_system::ReducedSystem;
@@ -44,6 +45,10 @@ pub(super) struct NormalEquations {
 impl NormalEquations {
     /// Room for the normal equations of a problem.
     pub(super) fn new(problem: &Problem, options: &SolverOptions) -> Result<Self, Error> {
+        let sizes = 1..=MOST_FREEDOM;
+        if let Some(found) = problem.spaces.iter().map(|s| s.freedom()).find(|size| !sizes.contains(size)) {
+            return Err(Error::Freedom { most: MOST_FREEDOM, found });
+        }
         let (structure, system, plan) = Elimination::new(problem, options)?;
         let sizes = || structure.reduced_sizes.iter().chain(&structure.eliminated_sizes).copied();
         let (mut step_start, mut block_start) = (vec![0], vec![0]);
@@ -122,6 +127,9 @@ impl NormalEquations {
                     3 => sum_diagonal::<3>(incidences, residuals, jacobians, gradient, block),
                     2 => sum_diagonal::<2>(incidences, residuals, jacobians, gradient, block),
                     5 => sum_diagonal::<5>(incidences, residuals, jacobians, gradient, block),
+                    9 => sum_diagonal::<9>(incidences, residuals, jacobians, gradient, block),
+                    8 => sum_diagonal::<8>(incidences, residuals, jacobians, gradient, block),
+                    7 => sum_diagonal::<7>(incidences, residuals, jacobians, gradient, block),
                     _ => sum_diagonal::<1>(incidences, residuals, jacobians, gradient, block),
                 }
             }
@@ -144,6 +152,7 @@ impl NormalEquations {
                         (6, 3) => add_product::<6, 3>(pair, jacobians, tie),
                         (4, 6) => add_product::<4, 6>(pair, jacobians, tie),
                         (6, 4) => add_product::<6, 4>(pair, jacobians, tie),
+                        (3, 9) => add_product::<3, 9>(pair, jacobians, tie),
                         _ => add_any_product(pair, jacobians, size, other, tie),
                     }
                 }
@@ -205,6 +214,9 @@ impl NormalEquations {
                         3 => invert::<3>(block, diagonal, damping, inverse),
                         2 => invert::<2>(block, diagonal, damping, inverse),
                         5 => invert::<5>(block, diagonal, damping, inverse),
+                        9 => invert::<9>(block, diagonal, damping, inverse),
+                        8 => invert::<8>(block, diagonal, damping, inverse),
+                        7 => invert::<7>(block, diagonal, damping, inverse),
                         _ => invert::<1>(block, diagonal, damping, inverse),
                     };
                     if !positive {
@@ -217,6 +229,7 @@ impl NormalEquations {
                         match (size, columns) {
                             (3, 6) => multiply_fixed::<3, 6>(inverse, &ties[numbers], solved),
                             (6, 3) => multiply_fixed::<6, 3>(inverse, &ties[numbers], solved),
+                            (3, 9) => multiply_fixed::<3, 9>(inverse, &ties[numbers], solved),
                             _ => multiply(inverse, &ties[numbers], size, columns, solved),
                         }
                     }
@@ -278,6 +291,9 @@ impl NormalEquations {
                         }
                         (6, 3, 3) => {
                             subtract::<6, 3, 3>(tie, solved, values, row == column, |c| places.at(row, c));
+                        }
+                        (3, 9, 9) => {
+                            subtract::<3, 9, 9>(tie, solved, values, row == column, |c| places.at(row, c));
                         }
                         (2, 6, 6) => {
                             subtract::<2, 6, 6>(tie, solved, values, row == column, |c| places.at(row, c));
@@ -451,6 +467,9 @@ impl NormalEquations {
                     3 => pull_fixed::<3>(incidences, y, &self.linear.jacobians, target),
                     2 => pull_fixed::<2>(incidences, y, &self.linear.jacobians, target),
                     5 => pull_fixed::<5>(incidences, y, &self.linear.jacobians, target),
+                    7 => pull_fixed::<7>(incidences, y, &self.linear.jacobians, target),
+                    8 => pull_fixed::<8>(incidences, y, &self.linear.jacobians, target),
+                    9 => pull_fixed::<9>(incidences, y, &self.linear.jacobians, target),
                     _ => pull_fixed::<1>(incidences, y, &self.linear.jacobians, target),
                 }
             }

@@ -2,6 +2,8 @@
 
 use super::error::Error;
 use super::options::{Method, Options};
+use super::planar_pose::is_planar;
+use super::relative_poses::{RelativeView, relative_view};
 use super::summary::{Reason, Summary, Tally};
 use super::whitening::root as information_root;
 use crate::geometry::{PinholeCamera, PluckerLine, Pose, Segment, line_residual};
@@ -58,15 +60,6 @@ pub(super) struct LineView {
     pub(super) information: Option<DMatrix<f64>>,
 }
 
-/// A frame as seen from another.
-#[derive(Clone, Debug)]
-pub(super) struct RelativeView {
-    pub(super) frame: usize,
-    pub(super) other: usize,
-    pub(super) frame_from_other: Pose,
-    pub(super) information: Option<DMatrix<f64>>,
-}
-
 /// What can be used of a graph.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Observations {
@@ -76,6 +69,8 @@ pub(super) struct Observations {
     pub(super) point_views: Vec<PointView>,
     pub(super) line_views: Vec<LineView>,
     pub(super) relatives: Vec<RelativeView>,
+    /// Whether poses and relative poses keep the plane z = 0 and nothing is said of what leaves it; they are then adjusted in it.
+    pub(super) planar: bool,
     pub(super) noise: MeasurementNoise,
 }
 
@@ -120,6 +115,10 @@ impl Observations {
         }
         found.drop_rare(options.min_views, summary);
         found.count(summary);
+        found.planar = options.method == Method::PoseGraph
+            && options.priors.is_empty()
+            && found.frames.iter().all(|frame| is_planar(&frame.camera_from_world))
+            && found.relatives.iter().all(RelativeView::is_planar);
         let nothing = |expected| Error::Nothing { graph: graph.name.clone(), expected };
         if found.frames.is_empty() {
             return Err(nothing("poses"));
@@ -330,7 +329,7 @@ impl Observations {
 }
 
 /// The first member of a set of joined places; shortens the way there.
-fn root(parent: &mut [usize], mut at: usize) -> usize {
+pub(super) fn root(parent: &mut [usize], mut at: usize) -> usize {
     while parent[at] != at {
         parent[at] = parent[parent[at]];
         at = parent[at];
@@ -377,20 +376,12 @@ fn squeeze<T>(list: &mut Vec<T>, marked: &[bool], tally: &mut Tally) -> Vec<usiz
     places
 }
 
-fn relative_view(factor: &GraphFactor, frames: &BTreeMap<FrameId, usize>) -> Result<RelativeView, Reason> {
-    let [tx, ty, tz, qx, qy, qz, qw] = factor.measurement[..] else { return Err(Reason::NotFinite) };
-    let pose = Pose::from_components([tx, ty, tz], [qx, qy, qz, qw]).map_err(|_| Reason::NotFinite)?;
-    let place = |id: Option<FrameId>| id.and_then(|id| frames.get(&id).copied()).ok_or(Reason::UnknownVertex);
-    let (frame, other) = (place(factor.frame_id)?, place(factor.other_frame_id)?);
-    if frame == other {
-        return Err(Reason::UnknownVertex);
-    }
-    let information = information(factor, 6, 6)?;
-    Ok(RelativeView { frame, other, frame_from_other: pose, information })
-}
-
 /// The information matrix of a factor over its first `used` numbers; the others are left open, not held.
-fn information(factor: &GraphFactor, size: usize, used: usize) -> Result<Option<DMatrix<f64>>, Reason> {
+pub(super) fn information(
+    factor: &GraphFactor,
+    size: usize,
+    used: usize,
+) -> Result<Option<DMatrix<f64>>, Reason> {
     let Some(numbers) = &factor.information else { return Ok(None) };
     if numbers.len() != size * (size + 1) / 2 || !numbers.iter().all(|number| number.is_finite()) {
         return Err(Reason::BadInformation);

@@ -158,7 +158,12 @@ impl Options {
             Method::Structural => Loss::Huber(3.0),
             Method::PoseGraph => Loss::None,
         };
-        Self { method, loss, ..Self::default() }
+        let mut solver = SolverOptions::default();
+        if method == Method::PoseGraph {
+            // Relative poses are all but linear near a start of odometry: undamped steps are the best, and damping comes where one fails.
+            solver.damping = 1e-9;
+        }
+        Self { method, loss, solver, ..Self::default() }
     }
 
     /// The name of the estimate.

@@ -2,6 +2,7 @@
 
 use super::elimination::{Incidence, Lists, for_each_factor};
 use super::linearisation::Linearisation;
+use super::parametrisation::MOST_FREEDOM;
 use super::problem::{Problem, Values};
 use nalgebra::{SMatrix, SVector, linalg::Cholesky};
 use rayon::prelude::*;
@@ -91,7 +92,7 @@ impl Set {
 
     /// One step of each variable, into `moved` where it lowers its cost.
     fn step(&self, problem: &Problem, numbers: &[f64], linear: &Linearisation, moved: &mut [f64]) {
-        let found: Vec<Option<[f64; 6]>> = (0..self.variables.len())
+        let found: Vec<Option<[f64; MOST_FREEDOM]>> = (0..self.variables.len())
             .into_par_iter()
             .with_min_len(CHUNK)
             .map(|at| {
@@ -105,7 +106,9 @@ impl Set {
                     2 => own_step::<2>(shares, linear),
                     1 => own_step::<1>(shares, linear),
                     5 => own_step::<5>(shares, linear),
-                    // Larger ones stay.
+                    7 => own_step::<7>(shares, linear),
+                    8 => own_step::<8>(shares, linear),
+                    9 => own_step::<9>(shares, linear),
                     _ => None,
                 }
             })
@@ -147,7 +150,7 @@ impl Set {
 }
 
 /// The Gauss-Newton step of one variable alone.
-fn own_step<const N: usize>(shares: &[Share], linear: &Linearisation) -> Option<[f64; 6]> {
+fn own_step<const N: usize>(shares: &[Share], linear: &Linearisation) -> Option<[f64; MOST_FREEDOM]> {
     let (mut hessian, mut gradient) = (SMatrix::<f64, N, N>::zeros(), SVector::<f64, N>::zeros());
     for Share { incidence, .. } in shares {
         for k in 0..incidence.rows as usize {
@@ -161,7 +164,7 @@ fn own_step<const N: usize>(shares: &[Share], linear: &Linearisation) -> Option<
         hessian[(k, k)] += DAMPING * hessian[(k, k)];
     }
     let step = -Cholesky::new(hessian)?.solve(&gradient);
-    let mut found = [0.0; 6];
+    let mut found = [0.0; MOST_FREEDOM];
     found[..N].copy_from_slice(step.as_slice());
     step.iter().all(|entry| entry.is_finite()).then_some(found)
 }

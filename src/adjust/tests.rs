@@ -11,11 +11,11 @@ use crate::geometry::Pose;
 use crate::structure::{Estimate, FactorGraph, FrameId, GraphFactor, registry};
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
-fn options(method: Method) -> Options {
+pub(super) fn options(method: Method) -> Options {
     Options { method, loss: Loss::None, ..Options::default() }
 }
 
-fn estimation(graph: &FactorGraph, options: &Options) -> Estimation {
+pub(super) fn estimation(graph: &FactorGraph, options: &Options) -> Estimation {
     let mut summary = Summary::default();
     let observations = Observations::of(graph, options, &mut summary).unwrap();
     let grouping = match options.parallelism {
@@ -26,7 +26,7 @@ fn estimation(graph: &FactorGraph, options: &Options) -> Estimation {
 }
 
 /// Largest difference between Jacobians and central differences, relative to the largest entry.
-fn jacobian_error(problem: &Problem) -> f64 {
+pub(super) fn jacobian_error(problem: &Problem) -> f64 {
     let (rows, step) = (problem.layout.residuals, 1e-6);
     let mut linear = Linearisation::new(problem);
     problem.linearise(&problem.numbers, &mut linear);
@@ -74,7 +74,7 @@ fn jacobian_error(problem: &Problem) -> f64 {
 }
 
 /// Central differences with a step of 1e-6 lose six digits to rounding and to curvature.
-const DIFFERENCES: f64 = 1e-6;
+pub(super) const DIFFERENCES: f64 = 1e-6;
 
 fn small() -> Scene {
     Scene { frames: 4, points: 6, lines: 6, sigma_px: 1.0, sigma_m: 0.05, ..Scene::default() }
@@ -243,7 +243,8 @@ fn without_noise_every_method_ends_at_the_truth() {
     }
     let (graph, truth) = ring(12, 0.0, 0.1);
     let adjusted = adjust(&graph, &options(Method::PoseGraph)).unwrap();
-    assert!(worst_centre(&adjusted.estimate, &truth) < 1e-9, "{:?}", adjusted.summary);
+    // The solver stops where no entry of the gradient is above 1e-9; a ring of twelve adds up what is left.
+    assert!(worst_centre(&adjusted.estimate, &truth) < 1e-8, "{:?}", adjusted.summary);
 }
 
 #[test]

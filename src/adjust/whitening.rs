@@ -21,6 +21,25 @@ pub(super) fn root(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     if !information.iter().all(|number| number.is_finite()) {
         return None;
     }
+    // What is left open altogether has a row of zeros; the others may be positive without it.
+    let size = information.nrows();
+    let known: Vec<usize> =
+        (0..size).filter(|row| information.row(*row).iter().any(|number| *number != 0.0)).collect();
+    if known.len() < size {
+        let part = DMatrix::from_fn(known.len(), known.len(), |row, column| {
+            information[(known[row], known[column])]
+        });
+        if let Some(factor) = part.cholesky() {
+            let upper = factor.l().transpose();
+            let mut root = DMatrix::zeros(size, size);
+            for (row, at) in known.iter().enumerate() {
+                for (column, other) in known.iter().enumerate() {
+                    root[(*at, *other)] = upper[(row, column)];
+                }
+            }
+            return Some(root);
+        }
+    }
     let eigen = SymmetricEigen::new(information.clone());
     let largest = eigen.eigenvalues.amax();
     if eigen.eigenvalues.iter().any(|value| *value < -ROUNDING.sqrt() * largest) {
@@ -143,7 +162,8 @@ mod tests {
         let whole = DMatrix::from_fn(3, 3, |row, column| rows[row][column]);
         let flat = DMatrix::from_diagonal(&nalgebra::DVector::from_vec(vec![0.0, 4.0, 0.0]));
         let across = nalgebra::DVector::from_vec(vec![1.0, -2.0, 0.5]);
-        for information in [whole, flat, &across * across.transpose(), DMatrix::zeros(3, 3)] {
+        let open = DMatrix::from_row_slice(3, 3, &[4.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 9.0]);
+        for information in [whole, flat, open, &across * across.transpose(), DMatrix::zeros(3, 3)] {
             let root = root(&information).unwrap();
             assert!((root.transpose() * &root - &information).amax() < 1e-14, "{information}");
         }

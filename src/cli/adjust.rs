@@ -5,24 +5,27 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 
 use anyhow::Context;
-use serde_json::json;
 
+use super::adjust_words::{as_json, as_text};
+use super::foreign::{self, Foreign};
 use super::progress::Progress;
-use super::{Outcome, extended, parsed, text};
+use super::{Outcome, adjust_foreign, extended, parsed};
 use crate::adjust::{
-    Adjusted, Eliminate, Factorisation, LineKind, Loss, Method, Optimiser, Options, Parallelism, PointForm,
-    SolverOptions, Summary, Tally, adjust_watched,
+    Adjusted, Eliminate, Error, Factorisation, LineKind, Loss, Method, Optimiser, Options, Parallelism,
+    PointForm, SolverOptions, Step, Summary, adjust_watched,
 };
+use crate::format;
 use crate::structure::{Estimate, FactorGraph, FrameId, Sequence};
-
-/// Names listed of a kind of frame or line before the rest is only counted.
-const MOST_NAMES: usize = 8;
 
 /// Adjust a factor graph: move poses and landmarks to where the measurements agree best.
 ///
 /// The output is the input with the estimate added: trajectory, map and the optimiser's steps. What cannot be used is left out and
 /// counted. Parallel lines are taken from the sequence's structural groups, not from factors of kind `parallelism`, which say the same.
 /// The same input gives the same bytes on any number of threads.
+///
+/// A graph of g2o and a problem of Bundle Adjustment in the Large are read as they are. A problem of BAL is adjusted by its own camera:
+/// focal length and two radial coefficients of every image are free, and nothing is held. The output is a file of the input's kind
+/// (NAME.g2o, NAME.txt), or a sequence with the initial graph and the estimate.
 #[derive(clap::Args, Debug)]
 #[command(after_help = "Methods:
   point        poses and points by pixels (the paper's Point-BA)
@@ -35,32 +38,40 @@ Losses, in units of sigma: none, huber:1.345, cauchy:1, tukey:4.685, geman-mcclu
 Examples:
   os adjust graph.mcap -o adjusted.mcap --method structural --covariance
   os adjust box1 -o adjusted.mcap --method point --replace
-  os adjust box1 -o again/ --method point-line --lines endpoints --loss huber:2 --name endpoints")]
+  os adjust box1 -o again/ --method point-line --lines endpoints --loss huber:2 --name endpoints
+  os adjust sphere2500.g2o -o adjusted.g2o
+  os adjust problem-49-7776-pre.txt -o adjusted.txt --explain
+  os adjust problem-49-7776-pre.txt -o ladybug.mcap --loss huber:1")]
 #[expect(clippy::struct_excessive_bools, reason = "each is a flag of the command line")]
 pub(super) struct Args {
-    /// Sequence with a factor graph: an MCAP file or a Parquet folder.
-    sequence: PathBuf,
-    /// Output: NAME.mcap for an MCAP file, any other name for a Parquet folder.
+    /// Sequence with a factor graph (an MCAP file or a Parquet folder), a graph of g2o, or a problem of BAL, uncompressed.
+    #[arg(value_name = "INPUT")]
+    pub(super) input: PathBuf,
+    /// Output: NAME.mcap for an MCAP file, any other name for a Parquet folder; NAME.g2o for a graph of g2o, NAME.txt for a problem of
+    /// BAL.
     #[arg(short, long, value_name = "PATH")]
-    output: PathBuf,
-    /// What is adjusted with what.
-    #[arg(long, value_enum, default_value_t = MethodName::PointLine)]
-    method: MethodName,
+    pub(super) output: PathBuf,
+    /// What the input is, if it is no sequence; found out by the name and the first line where it is not given.
+    #[arg(long, value_enum, value_name = "FORMAT")]
+    from: Option<Foreign>,
+    /// What is adjusted with what [default: point-line; for g2o pose-graph, or point where there are points].
+    #[arg(long, value_enum)]
+    pub(super) method: Option<MethodName>,
     /// Graph to adjust; needed where there are several and none is `initial`.
     #[arg(long, value_name = "NAME")]
-    graph: Option<String>,
-    /// Name of the estimate [default: point-ba, point-line-ba, structural-ba or pose-graph].
+    pub(super) graph: Option<String>,
+    /// Name of the estimate [default: point-ba, point-line-ba, structural-ba, pose-graph or bal].
     #[arg(long, value_name = "NAME")]
-    name: Option<String>,
-    /// How points are kept.
-    #[arg(long, value_enum, default_value_t = PointName::Xyz)]
-    points: PointName,
-    /// How lines are kept.
-    #[arg(long, value_enum, default_value_t = LineName::Orthonormal)]
-    lines: LineName,
-    /// Robust loss, KIND or KIND:SCALE [default: cauchy:1 for point and point-line, huber:3 for structural, none for pose-graph].
+    pub(super) name: Option<String>,
+    /// How points are kept [default: xyz].
+    #[arg(long, value_enum)]
+    pub(super) points: Option<PointName>,
+    /// How lines are kept [default: orthonormal].
+    #[arg(long, value_enum)]
+    pub(super) lines: Option<LineName>,
+    /// Robust loss, KIND or KIND:SCALE [default: cauchy:1 for point and point-line, huber:3 for structural, none for pose-graph and BAL].
     #[arg(long, value_name = "LOSS", value_parser = str::parse::<Loss>)]
-    loss: Option<Loss>,
+    pub(super) loss: Option<Loss>,
     /// How steps are found.
     #[arg(long, value_enum, default_value_t = OptimiserName::Lm)]
     optimiser: OptimiserName,
@@ -70,25 +81,25 @@ pub(super) struct Args {
     /// Stop when a step lowers the cost by less than this part of it.
     #[arg(long, value_name = "F", value_parser = parsed::not_negative)]
     tolerance: Option<f64>,
-    /// Leave out landmarks that fewer frames see.
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = parsed::at_least_one)]
-    min_views: usize,
+    /// Leave out landmarks that fewer frames see [default: 3].
+    #[arg(long, value_name = "N", value_parser = parsed::at_least_one)]
+    pub(super) min_views: Option<usize>,
     /// Hold the pose of this frame; may be given several times.
     #[arg(long, value_name = "FRAME")]
-    fix: Vec<i64>,
+    pub(super) fix: Vec<i64>,
     /// Standard deviation of pixel coordinates, in place of the declared one.
     #[arg(long, value_name = "PX", value_parser = parsed::positive)]
-    sigma_px: Option<f64>,
+    pub(super) sigma_px: Option<f64>,
     /// Draw parallel lines to the direction of their group, by this many degrees of standard deviation, in place of one direction for
     /// all (structural).
     #[arg(long, value_name = "DEGREES", num_args = 0..=1, default_missing_value = "0.5", value_parser = parsed::positive)]
-    soft: Option<f64>,
+    pub(super) soft: Option<f64>,
     /// Make no use of structural groups (structural).
     #[arg(long, conflicts_with = "soft")]
-    no_groups: bool,
+    pub(super) no_groups: bool,
     /// Let frames that see too little go where noise carries them, in place of moving as they did at the start (structural).
     #[arg(long)]
-    no_motion: bool,
+    pub(super) no_motion: bool,
     /// What the solver eliminates first [default: whatever costs least].
     #[arg(long, value_enum, value_name = "WHAT")]
     eliminate: Option<EliminateName>,
@@ -97,26 +108,26 @@ pub(super) struct Args {
     factorise: Option<FactoriseName>,
     /// Say how the solver goes about it, with the cost of the other ways.
     #[arg(long)]
-    explain: bool,
+    pub(super) explain: bool,
     /// Store covariances of poses and landmarks.
     #[arg(long)]
-    covariance: bool,
+    pub(super) covariance: bool,
     /// Replace an estimate of the same name.
     #[arg(long)]
-    replace: bool,
+    pub(super) replace: bool,
     /// Replace the output if it exists.
     #[arg(long)]
-    force: bool,
+    pub(super) force: bool,
     /// Print the summary as JSON.
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
     /// Threads [default: one for each core].
     #[arg(long, value_name = "N", value_parser = parsed::threads)]
-    threads: Option<usize>,
+    pub(super) threads: Option<usize>,
 }
 
 #[derive(clap::ValueEnum, Clone, Copy, Debug)]
-enum MethodName {
+pub(super) enum MethodName {
     Point,
     PointLine,
     Structural,
@@ -124,14 +135,14 @@ enum MethodName {
 }
 
 #[derive(clap::ValueEnum, Clone, Copy, Debug)]
-enum PointName {
+pub(super) enum PointName {
     Xyz,
     InverseDepth,
     Parallax,
 }
 
 #[derive(clap::ValueEnum, Clone, Copy, Debug)]
-enum LineName {
+pub(super) enum LineName {
     Orthonormal,
     Endpoints,
     PluckerCayley,
@@ -172,27 +183,59 @@ impl Args {
             ("--no-motion", self.no_motion),
         ];
         let idle = of_structural.into_iter().find(|(_, given)| *given);
-        if let Some((option, _)) = idle.filter(|_| !matches!(self.method, MethodName::Structural)) {
+        if let Some((option, _)) = idle.filter(|_| !matches!(self.method, Some(MethodName::Structural))) {
             anyhow::bail!("{option} goes with --method structural");
         }
         Ok(())
     }
 
-    fn options(&self) -> Options {
+    /// What is asked for; `usual` is the method where none is given.
+    pub(super) fn options(&self, usual: Method) -> Options {
         let method = match self.method {
-            MethodName::Point => Method::Point,
-            MethodName::PointLine => Method::PointLine,
-            MethodName::Structural => Method::Structural,
-            MethodName::PoseGraph => Method::PoseGraph,
+            Some(MethodName::Point) => Method::Point,
+            Some(MethodName::PointLine) => Method::PointLine,
+            Some(MethodName::Structural) => Method::Structural,
+            Some(MethodName::PoseGraph) => Method::PoseGraph,
+            None => usual,
         };
         let usual = Options::of(method);
-        let solver = SolverOptions {
+        Options {
+            name: self.name.clone(),
+            points: match self.points {
+                Some(PointName::InverseDepth) => PointForm::InverseDepth,
+                Some(PointName::Parallax) => PointForm::Parallax,
+                Some(PointName::Xyz) | None => usual.points,
+            },
+            lines: match self.lines {
+                Some(LineName::Endpoints) => LineKind::Endpoints,
+                Some(LineName::PluckerCayley) => LineKind::PluckerCayley,
+                Some(LineName::Orthonormal) | None => usual.lines,
+            },
+            parallelism: match self.soft {
+                Some(degrees) => Parallelism::Soft { sigma_rad: degrees.to_radians() },
+                None if self.no_groups => Parallelism::Ignored,
+                None => usual.parallelism,
+            },
+            loss: self.loss.unwrap_or(usual.loss),
+            sigma_px: self.sigma_px,
+            min_views: self.min_views.unwrap_or(usual.min_views),
+            fix: self.fix.iter().map(|frame| FrameId(*frame)).collect(),
+            smooth_motion: !self.no_motion,
+            covariance: self.covariance,
+            solver: self.solver(usual.solver),
+            ..usual
+        }
+    }
+
+    /// When to stop and how to step; what is not given is as usual.
+    pub(super) fn solver(&self, usual: SolverOptions) -> SolverOptions {
+        SolverOptions {
             optimiser: match self.optimiser {
                 OptimiserName::Lm => Optimiser::LevenbergMarquardt,
                 OptimiserName::Dogleg => Optimiser::DogLeg,
             },
-            max_iterations: self.max_iterations.unwrap_or(usual.solver.max_iterations),
-            function_tolerance: self.tolerance.unwrap_or(usual.solver.function_tolerance),
+            max_iterations: self.max_iterations.unwrap_or(usual.max_iterations),
+            function_tolerance: self.tolerance.unwrap_or(usual.function_tolerance),
             eliminate: match self.eliminate {
                 Some(EliminateName::Landmarks) => Eliminate::Landmarks,
                 Some(EliminateName::Poses) => Eliminate::Poses,
@@ -204,32 +247,6 @@ impl Args {
                 Some(FactoriseName::Sparse) => Factorisation::Sparse,
                 None => Factorisation::Cheapest,
             },
-            ..usual.solver
-        };
-        Options {
-            name: self.name.clone(),
-            points: match self.points {
-                PointName::Xyz => PointForm::Xyz,
-                PointName::InverseDepth => PointForm::InverseDepth,
-                PointName::Parallax => PointForm::Parallax,
-            },
-            lines: match self.lines {
-                LineName::Orthonormal => LineKind::Orthonormal,
-                LineName::Endpoints => LineKind::Endpoints,
-                LineName::PluckerCayley => LineKind::PluckerCayley,
-            },
-            parallelism: match self.soft {
-                Some(degrees) => Parallelism::Soft { sigma_rad: degrees.to_radians() },
-                None if self.no_groups => Parallelism::Ignored,
-                None => usual.parallelism,
-            },
-            loss: self.loss.unwrap_or(usual.loss),
-            sigma_px: self.sigma_px,
-            min_views: self.min_views,
-            fix: self.fix.iter().map(|frame| FrameId(*frame)).collect(),
-            smooth_motion: !self.no_motion,
-            covariance: self.covariance,
-            solver,
             ..usual
         }
     }
@@ -237,38 +254,94 @@ impl Args {
 
 pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome> {
     args.refuse_idle()?;
-    let (mut sequence, mut outcome) = extended::read(&args.sequence, &args.output, args.force)?;
+    if let Some(from) = args.from.map_or_else(|| foreign::of(&args.input), |from| Ok(Some(from)))? {
+        return adjust_foreign::run(args, from, stdout);
+    }
+    if args.input.is_file() && args.input.extension().is_none_or(|extension| extension != "mcap") {
+        format::open(&args.input).map(drop).with_context(|| {
+            let input = args.input.display();
+            format!(
+                "{input}: not known as a graph of g2o or a problem of BAL; if it is one, say so with --from"
+            )
+        })?;
+    }
+    adjust_foreign::refuse_output_of_others(&args.output)?;
+    let (mut sequence, mut outcome) = extended::read(&args.input, &args.output, args.force)?;
     extended::check_cameras(&sequence)?;
-    let options = args.options();
+    let options = args.options(Method::default());
     let name = options.estimate_name().to_owned();
     extended::check_name("an estimate", &name, Estimate::is_in(&sequence, &name), args.replace)?;
     let graph = pick(args.graph.as_deref(), &sequence)?;
     if args.graph.is_none() {
         writeln!(io::stderr(), "adjusting the graph `{}`", graph.name)?;
     }
-    let adjusted = adjust_on_threads(&graph, &options, args.threads)?;
+    let adjusted = args.watched(|watch| adjust_watched(&graph, &options, watch))?;
     let Adjusted { estimate, summary } = adjusted;
-    if args.explain {
-        write!(io::stderr(), "{}", summary.plan)?;
-    }
-    if !summary.ending.has_converged() {
-        outcome = Outcome::Findings;
-    }
-    if let Some(cause) = &summary.no_covariance {
-        writeln!(io::stderr(), "warning: no covariances: {cause}")?;
-        outcome = Outcome::Findings;
-    }
+    outcome = args.outcome(&summary, outcome)?;
     estimate.put(&mut sequence);
     sequence.sort();
     let size = extended::write(&args.output, sequence, args.force)?;
-    if args.json {
-        serde_json::to_writer_pretty(&mut *stdout, &as_json(&graph.name, &name, &summary))?;
-        writeln!(stdout)?;
-    } else {
-        write!(stdout, "{}", as_text(&graph.name, &name, &summary))?;
-        writeln!(stdout, "{}: {}", args.output.display(), size)?;
-    }
+    args.tell(&graph.name, &name, &summary, &size, stdout)?;
     Ok(outcome)
+}
+
+impl Args {
+    /// Adjusts on the threads that are asked for, with a progress bar.
+    pub(super) fn watched<T: Send>(
+        &self,
+        adjust: impl FnOnce(&mut dyn FnMut(&Step) -> bool) -> Result<T, Error> + Send,
+    ) -> anyhow::Result<T> {
+        let progress = Progress::new("adjusting", "steps");
+        let most = self.solver(SolverOptions::default()).max_iterations as u64;
+        let mut done = 0;
+        let run = || {
+            adjust(&mut |_| {
+                done += 1;
+                progress.update(done, most.max(done));
+                true
+            })
+        };
+        let adjusted = match self.threads {
+            Some(threads) => rayon::ThreadPoolBuilder::new().num_threads(threads).build()?.install(run),
+            None => run(),
+        };
+        Ok(adjusted?)
+    }
+
+    /// Says the plan where it is asked for, and what is left to be desired.
+    pub(super) fn outcome(&self, summary: &Summary, outcome: Outcome) -> anyhow::Result<Outcome> {
+        let mut outcome = outcome;
+        if self.explain {
+            write!(io::stderr(), "{}", summary.plan)?;
+        }
+        if !summary.ending.has_converged() {
+            outcome = Outcome::Findings;
+        }
+        if let Some(cause) = &summary.no_covariance {
+            writeln!(io::stderr(), "warning: no covariances: {cause}")?;
+            outcome = Outcome::Findings;
+        }
+        Ok(outcome)
+    }
+
+    /// Prints how it went.
+    pub(super) fn tell(
+        &self,
+        graph: &str,
+        name: &str,
+        summary: &Summary,
+        size: &str,
+        stdout: &mut dyn Write,
+    ) -> anyhow::Result<()> {
+        if self.json {
+            serde_json::to_writer_pretty(&mut *stdout, &as_json(graph, name, summary))?;
+            writeln!(stdout)?;
+        } else {
+            write!(stdout, "{}", as_text(graph, name, summary))?;
+            writeln!(stdout, "{}: {size}", self.output.display())?;
+        }
+        Ok(())
+    }
 }
 
 /// The graph of a name, or the one that is meant where none is given.
@@ -287,133 +360,4 @@ fn pick(name: Option<&str>, sequence: &Sequence) -> anyhow::Result<FactorGraph> 
     };
     let picked = picked.with_context(|| format!("which graph? --graph takes one of: {}", list(&names)))?;
     FactorGraph::of(sequence, picked).context("the graph is empty")
-}
-
-fn adjust_on_threads(
-    graph: &FactorGraph,
-    options: &Options,
-    threads: Option<usize>,
-) -> anyhow::Result<Adjusted> {
-    let progress = Progress::new("adjusting", "steps");
-    let most = options.solver.max_iterations as u64;
-    let mut done = 0;
-    let mut run = || {
-        adjust_watched(graph, options, &mut |_| {
-            done += 1;
-            progress.update(done, most.max(done));
-            true
-        })
-    };
-    let adjusted = match threads {
-        Some(threads) => rayon::ThreadPoolBuilder::new().num_threads(threads).build()?.install(&mut run),
-        None => run(),
-    };
-    Ok(adjusted?)
-}
-
-/// Names of some frames or lines, and how many there are beyond.
-fn names(ids: &[i64]) -> String {
-    let shown: Vec<String> = ids.iter().take(MOST_NAMES).map(i64::to_string).collect();
-    let rest = ids.len().saturating_sub(MOST_NAMES);
-    let more = if rest > 0 { format!(" and {rest} more") } else { String::new() };
-    format!("{}{more}", shown.join(", "))
-}
-
-fn as_text(graph: &str, name: &str, summary: &Summary) -> String {
-    let mut lines = vec![format!("{name} from graph `{graph}`")];
-    lines.push(format!(
-        "  cost       {:.6e} -> {:.6e}, residuals {:.3} sigma RMS",
-        summary.initial_cost, summary.final_cost, summary.residual_rms
-    ));
-    lines.push(format!("  ending     {}, {} steps", summary.ending.words(), summary.iterations));
-    lines.push(format!(
-        "  problem    {} residuals, {} unknowns, {} part{}",
-        text::count(summary.residuals as u64),
-        text::count(summary.unknowns as u64),
-        summary.components,
-        if summary.components == 1 { "" } else { "s" }
-    ));
-    for (what, tally) in tallies(summary) {
-        if tally.used > 0 || !tally.excluded.is_empty() {
-            let excluded = tally.excluded.iter();
-            let excluded: Vec<String> = excluded
-                .map(|(reason, count)| format!("{} left out: {}", text::count(*count as u64), reason.words()))
-                .collect();
-            let excluded =
-                if excluded.is_empty() { String::new() } else { format!("; {}", excluded.join("; ")) };
-            lines.push(format!("  {what:<10} {} used{excluded}", text::count(tally.used as u64)));
-        }
-    }
-    let ids = |frames: &[FrameId]| names(&frames.iter().map(|frame| frame.0).collect::<Vec<_>>());
-    for (what, frames) in [
-        ("held", &summary.held),
-        ("open", &summary.weak),
-        ("carried", &summary.carried),
-        ("unmeasured", &summary.unconstrained),
-    ] {
-        if !frames.is_empty() {
-            lines.push(format!("  {what:<10} {} poses: frames {}", frames.len(), ids(frames)));
-        }
-    }
-    if summary.grouped > 0 || !summary.released.is_empty() {
-        let released: Vec<i64> = summary.released.iter().map(|line| line.line_id.0).collect();
-        let released = if released.is_empty() {
-            String::new()
-        } else {
-            format!("; {} contradict theirs: lines {}", released.len(), names(&released))
-        };
-        lines.push(format!("  groups     {} lines share their group's direction{released}", summary.grouped));
-    }
-    lines.join("\n") + "\n"
-}
-
-fn tallies(summary: &Summary) -> [(&'static str, &Tally); 6] {
-    [
-        ("poses", &summary.poses),
-        ("points", &summary.points),
-        ("lines", &summary.lines),
-        ("of points", &summary.point_factors),
-        ("of lines", &summary.line_factors),
-        ("relative", &summary.relative_factors),
-    ]
-}
-
-fn as_json(graph: &str, name: &str, summary: &Summary) -> serde_json::Value {
-    let tally = |tally: &Tally| {
-        let excluded: serde_json::Map<_, _> =
-            tally.excluded.iter().map(|(reason, count)| (reason.words().to_owned(), json!(count))).collect();
-        json!({ "used": tally.used, "excluded": excluded })
-    };
-    let ids = |frames: &[FrameId]| frames.iter().map(|frame| frame.0).collect::<Vec<_>>();
-    json!({
-        "graph": graph,
-        "estimate": name,
-        "ending": summary.ending.words(),
-        "converged": summary.ending.has_converged(),
-        "iterations": summary.iterations,
-        "initial_cost": summary.initial_cost,
-        "final_cost": summary.final_cost,
-        "residual_rms_sigma": summary.residual_rms,
-        "residuals": summary.residuals,
-        "unknowns": summary.unknowns,
-        "components": summary.components,
-        "poses": tally(&summary.poses),
-        "points": tally(&summary.points),
-        "lines": tally(&summary.lines),
-        "point_factors": tally(&summary.point_factors),
-        "line_factors": tally(&summary.line_factors),
-        "relative_factors": tally(&summary.relative_factors),
-        "held": ids(&summary.held),
-        "weak": ids(&summary.weak),
-        "carried": ids(&summary.carried),
-        "unconstrained": ids(&summary.unconstrained),
-        "behind": summary.behind.iter().map(|point| point.0).collect::<Vec<_>>(),
-        "grouped_lines": summary.grouped,
-        "released_lines": summary.released.iter().map(|line| json!({
-            "line_id": line.line_id.0,
-            "group_id": line.group_id.0,
-            "angle_deg": line.angle_rad.to_degrees(),
-            "chi_squared": line.chi_squared,
-        })).collect::<Vec<_>>(),
-    })
 }

@@ -1,7 +1,7 @@
 //! `os import`: a graph or a model of another program as a sequence.
 
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read, Write};
+use std::io::{self, BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
@@ -9,6 +9,7 @@ use clap::ValueEnum;
 use sha2::{Digest, Sha256};
 
 use super::export::refuse_input;
+use super::foreign::{self, Foreign};
 use super::{Outcome, text};
 use crate::exchange::{
     ImportNames, Imported, from_bal, from_colmap, from_g2o, read_bal, read_colmap, read_g2o,
@@ -16,8 +17,6 @@ use crate::exchange::{
 use crate::format::{self, WriteOptions};
 use crate::structure::{SourceFile, hex};
 
-/// Bytes of a file that are looked at to find its format.
-const GLANCE_BYTES: u64 = 4096;
 /// The files of a COLMAP model.
 const COLMAP_FILES: [&str; 3] = ["cameras.txt", "images.txt", "points3D.txt"];
 
@@ -71,10 +70,13 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         Some(from) => from,
         None => guess(&args.input)?,
     };
-    let names = ImportNames { sequence: name(args)?, graph: args.graph.clone() };
+    if args.graph.is_empty() {
+        bail!("--graph: expected a name, found none");
+    }
+    let names = ImportNames { sequence: name(args.name.as_deref(), &args.input)?, graph: args.graph.clone() };
     let Imported { mut sequence, remarks } =
         read(&args.input, from, &names).with_context(|| args.input.display().to_string())?;
-    sequence.manifest.source.files = source_files(&args.input, from)?;
+    sequence.manifest.source.files = source_files(paths(&args.input, from))?;
     let options = WriteOptions { force: args.force, ..WriteOptions::default() };
     format::write(&args.output, &sequence, options)?;
     let mut outcome = Outcome::Done;
@@ -112,12 +114,16 @@ fn read(input: &Path, from: Format, names: &ImportNames) -> anyhow::Result<Impor
     })
 }
 
-/// The files that were read.
-fn source_files(input: &Path, from: Format) -> anyhow::Result<Vec<SourceFile>> {
-    let paths = match from {
+/// The files that are read.
+fn paths(input: &Path, from: Format) -> Vec<PathBuf> {
+    match from {
         Format::Colmap => COLMAP_FILES.iter().map(|name| input.join(name)).collect(),
         Format::G2o | Format::Bal => vec![input.to_owned()],
-    };
+    }
+}
+
+/// Names, sizes and hashes of files that were read.
+pub(super) fn source_files(paths: Vec<PathBuf>) -> anyhow::Result<Vec<SourceFile>> {
     let file = |path: PathBuf| {
         let mut hasher = Sha256::new();
         let mut file = BufReader::new(File::open(&path)?);
@@ -139,19 +145,16 @@ fn source_files(input: &Path, from: Format) -> anyhow::Result<Vec<SourceFile>> {
 }
 
 /// The name of the sequence: as given, or that of the input without what follows the last dot.
-fn name(args: &Args) -> anyhow::Result<String> {
-    let name = if let Some(name) = &args.name {
-        name.clone()
+pub(super) fn name(given: Option<&str>, input: &Path) -> anyhow::Result<String> {
+    let name = if let Some(name) = given {
+        name.to_owned()
     } else {
-        let path = args.input.canonicalize()?;
+        let path = input.canonicalize()?;
         let name = if path.is_dir() { path.file_name() } else { path.file_stem() };
         name.unwrap_or_default().to_string_lossy().into_owned()
     };
     if name.is_empty() || name.chars().any(|letter| "/\\".contains(letter) || letter.is_control()) {
         bail!("--name: expected a name without `/`, `\\` and control characters, found {name:?}");
-    }
-    if args.graph.is_empty() {
-        bail!("--graph: expected a name, found none");
     }
     Ok(name)
 }
@@ -170,31 +173,10 @@ fn guess(input: &Path) -> anyhow::Result<Format> {
         };
         bail!("{}: expected a folder with {}{hint}", input.display(), files.join(", "));
     }
-    if input.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("g2o")) {
-        return Ok(Format::G2o);
-    }
-    let file = File::open(input).with_context(|| input.display().to_string())?;
-    let mut reader = BufReader::new(file).take(GLANCE_BYTES);
-    let mut bytes = Vec::new();
-    loop {
-        bytes.clear();
-        if reader.read_until(b'\n', &mut bytes)? == 0 {
-            break;
-        }
-        let line = String::from_utf8_lossy(&bytes);
-        let line = line.trim();
-        if line.is_empty() || line.starts_with('#') {
-            continue;
-        }
-        let words: Vec<&str> = line.split_ascii_whitespace().collect();
-        let is_count = |word: &&str| word.bytes().all(|byte| byte.is_ascii_digit());
-        if words.len() == 3 && words.iter().all(is_count) {
-            return Ok(Format::Bal);
-        }
-        if ["VERTEX_", "EDGE_", "PARAMS_", "FIX"].iter().any(|tag| line.starts_with(tag)) {
-            return Ok(Format::G2o);
-        }
-        break;
+    match foreign::of(input)? {
+        Some(Foreign::G2o) => return Ok(Format::G2o),
+        Some(Foreign::Bal) => return Ok(Format::Bal),
+        None => {}
     }
     bail!(
         "{}: expected a graph of g2o, a problem of BAL or a model of COLMAP; say which with --from",

@@ -1,6 +1,8 @@
 //! The command line: arguments in, calls to the rooms below, rendering out.
 
 mod adjust;
+mod adjust_foreign;
+mod adjust_words;
 mod benchmark;
 mod cat;
 mod chart;
@@ -16,6 +18,7 @@ mod export;
 mod extended;
 mod fetch;
 mod fetch_progress;
+mod foreign;
 mod graph;
 mod import;
 mod import_trajectory;

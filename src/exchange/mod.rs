@@ -16,14 +16,14 @@ mod text_release;
 mod trajectory;
 mod valued;
 
-pub use bal::{BalCamera, BalObservation, BalProblem, from_bal, read_bal, to_bal, write_bal};
+pub use bal::{BalCamera, BalObservation, BalProblem, bal_estimate, from_bal, read_bal, to_bal, write_bal};
 pub use colmap::{
     ColmapCamera, ColmapImage, ColmapModel, ColmapPoint, ColmapPoint2, from_colmap, read_colmap, to_colmap,
     write_colmap,
 };
 pub use csv::to_csv;
 pub use error::Error;
-pub use g2o::{G2oElement, G2oForm, G2oGraph, G2oKind, from_g2o, read_g2o, to_g2o, write_g2o};
+pub use g2o::{G2oElement, G2oForm, G2oGraph, G2oKind, from_g2o, read_g2o, to_g2o, with_estimate, write_g2o};
 pub use imported::{ImportNames, Imported};
 pub use lines::{LARGEST_FILE_BYTES, MOST_ELEMENTS};
 pub use remark::Remark;

@@ -8,6 +8,7 @@
 //! P = R X + t,   p = −(P.x, P.y)/P.z,   pixel = f r(p) p,   r(p) = 1 + k1 |p|² + k2 |p|⁴
 //! ```
 
+mod estimate;
 mod export;
 mod import;
 mod problem;
@@ -16,6 +17,7 @@ mod radial;
 mod tests;
 mod text;
 
+pub use estimate::bal_estimate;
 pub use export::to_bal;
 pub use import::from_bal;
 pub use problem::{BalCamera, BalObservation, BalProblem};

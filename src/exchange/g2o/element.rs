@@ -100,3 +100,10 @@ pub struct G2oGraph {
     /// Lines that were passed over, by tag; not written.
     pub passed_over: BTreeMap<String, usize>,
 }
+
+impl G2oGraph {
+    /// The id of a point by that of its vertex.
+    pub(super) fn point_id(&self, id: i64) -> i64 {
+        if self.point_offset <= id { id - self.point_offset } else { id }
+    }
+}

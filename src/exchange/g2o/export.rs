@@ -302,7 +302,7 @@ fn is_planar_factor(factor: &GraphFactor) -> bool {
 }
 
 /// x, y and the angle about z, radians in (−π, π].
-fn flattened(pose: &PoseRow) -> [f64; 3] {
+pub(super) fn flattened(pose: &PoseRow) -> [f64; 3] {
     let [x, y, _, _, _, qz, qw] = pose.numbers();
     // Of the two quaternions of a rotation, the one with the real part above 0.
     let sign = if qw < 0.0 || (qw == 0.0 && qz < 0.0) { -1.0 } else { 1.0 };

@@ -11,8 +11,8 @@ use crate::structure::{Camera, CameraId, FrameId, GraphFactor, PointId, PoseRow,
 
 /// A g2o graph as a sequence: a frame for each pose, a point for each point, a factor for each edge.
 ///
-/// Poses and measurements keep their digits (SE(2) is lifted: z, roll and pitch are zero); information is turned to the
-/// registry's tangent, and is zero for z, roll and pitch of SE(2), where g2o says nothing. Ids are those of the file
+/// Poses and measurements keep their digits (SE(2) is lifted: z, roll and pitch are zero); information, taken to be per
+/// radian, is turned to the registry's tangent, and is zero for z, roll and pitch of SE(2), where g2o says nothing. Ids are those of the file
 /// (less [`G2oGraph::point_offset`] for points). Frames are a second apart.
 ///
 /// # Errors
@@ -25,7 +25,7 @@ pub fn from_g2o(graph: &G2oGraph, names: &ImportNames) -> Result<Imported, Error
         vertices: BTreeMap::new(),
         parameters: BTreeMap::new(),
         cameras: BTreeMap::new(),
-        point_offset: 0,
+        graph,
     };
     for (tag, count) in &graph.passed_over {
         import
@@ -39,7 +39,6 @@ pub fn from_g2o(graph: &G2oGraph, names: &ImportNames) -> Result<Imported, Error
         .filter(|element| element.kind == G2oKind::Fix)
         .flat_map(|element| element.ids.iter().copied())
         .collect();
-    import.point_offset = graph.point_offset;
     for element in &graph.elements {
         import.vertex(element)?;
     }
@@ -67,7 +66,7 @@ struct Import<'a> {
     parameters: BTreeMap<i64, &'a G2oElement>,
     /// Cameras by the bits of fx, fy, cx, cy.
     cameras: BTreeMap<[u64; 4], CameraId>,
-    point_offset: i64,
+    graph: &'a G2oGraph,
 }
 
 impl<'a> Import<'a> {
@@ -204,7 +203,7 @@ impl<'a> Import<'a> {
     }
 
     fn point(&self, id: i64) -> PointId {
-        PointId(if self.point_offset <= id { id - self.point_offset } else { id })
+        PointId(self.graph.point_id(id))
     }
 
     fn parameter(&self, id: i64, kind: G2oKind) -> Result<&'a [f64], Error> {

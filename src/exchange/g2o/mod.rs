@@ -10,10 +10,13 @@
 //!
 //! `VERTEX_XYZ`, `VERTEX_POINT_XYZ` and `VERTEX_TRACKXYZ` are one thing. `FIX` names vertices that are held. Pose
 //! vertices are `world_from_camera` in the file, `VERTEX_SE3:EXPMAP` too, although g2o holds its inverse in memory.
+//! Information of edges between poses is taken per radian, over `[t; 2 vec q]` of `Z⁻¹ Xᵢ⁻¹ Xⱼ` and over `[x y θ]`, as those
+//! who publish such files mean it; the program g2o leaves out the 2.
 //! `EDGE_SE3_PROJECT_XYZ:EXPMAP` carries no intrinsics in a file and is passed over, like every tag not named here;
 //! passed-over lines are counted.
 
 mod element;
+mod estimated;
 mod export;
 mod import;
 mod information;
@@ -22,6 +25,7 @@ mod tests;
 mod text;
 
 pub use element::{G2oElement, G2oGraph, G2oKind};
+pub use estimated::with_estimate;
 pub use export::{G2oForm, to_g2o};
 pub use import::from_g2o;
 pub use text::{read_g2o, write_g2o};

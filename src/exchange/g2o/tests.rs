@@ -47,11 +47,11 @@ fn information<const N: usize>() -> impl Strategy<Value = Vec<f64>> {
     })
 }
 
-/// g2o's own error of an edge in space: translation and vector part of the quaternion of `Z⁻¹ T`.
+/// The error of an edge in space: translation and twice the vector part of the quaternion of `Z⁻¹ T`.
 fn error_in_space(measured: &Pose, found: &Pose) -> Vector6<f64> {
     let (t, [x, y, z, w]) = (measured.inverse() * *found).components();
-    let sign = if w < 0.0 { -1.0 } else { 1.0 };
-    Vector6::new(t[0], t[1], t[2], sign * x, sign * y, sign * z)
+    let twice = if w < 0.0 { -2.0 } else { 2.0 };
+    Vector6::new(t[0], t[1], t[2], twice * x, twice * y, twice * z)
 }
 
 proptest! {
@@ -88,7 +88,7 @@ proptest! {
     }
 
     #[test]
-    fn information_in_space_weighs_small_errors_as_g2o_does(
+    fn information_in_space_weighs_small_errors_as_the_file_does(
         measured in pose(), weights in information::<6>(), small in prop::array::uniform6(-1.0..1.0_f64),
     ) {
         let tangent = Vector6::from(small) * 1e-6;
@@ -110,7 +110,7 @@ proptest! {
     }
 
     #[test]
-    fn information_in_the_plane_weighs_small_errors_as_g2o_does_and_says_nothing_else(
+    fn information_in_the_plane_weighs_small_errors_as_the_file_does_and_says_nothing_else(
         [x, y, angle] in prop::array::uniform3(-2.0..2.0_f64), weights in information::<3>(),
         small in prop::array::uniform6(-1.0..1.0_f64),
     ) {

@@ -73,6 +73,7 @@ pub struct Residual<const M: usize, const L: usize> {
 }
 
 impl<const M: usize, const L: usize> Residual<M, L> {
+    #[inline]
     fn empty() -> Self {
         Self {
             error: SVector::zeros(),
@@ -80,6 +81,13 @@ impl<const M: usize, const L: usize> Residual<M, L> {
             by_landmark: SMatrix::zeros(),
             noise: SMatrix::identity(),
             count: 0,
+        }
+    }
+
+    #[inline]
+    fn set_by_pose(&mut self, row: usize, derivative: &Vector6<f64>) {
+        for number in 0..6 {
+            self.by_pose[(row, number)] = derivative[number];
         }
     }
 
@@ -185,7 +193,7 @@ impl PointMatch {
         }
         for row in 0..3 {
             let by_seen = Vector3::new(by_seen[(row, 0)], by_seen[(row, 1)], by_seen[(row, 2)]);
-            residual.by_pose.set_row(row, &by_pose(&seen, &by_seen).transpose());
+            residual.set_by_pose(row, &by_pose(&seen, &by_seen));
         }
         residual.by_landmark = product(&by_seen, &rotation);
         residual.error.iter().all(|error| error.is_finite()).then_some(residual)
@@ -193,6 +201,7 @@ impl PointMatch {
 }
 
 /// `[p × g; g]`: how a number moves with the pose's tangent that has the derivative g by a point p in the camera.
+#[inline]
 fn by_pose(point: &Vector3<f64>, by_point: &Vector3<f64>) -> Vector6<f64> {
     let turn = point.cross(by_point);
     Vector6::new(turn.x, turn.y, turn.z, by_point.x, by_point.y, by_point.z)
@@ -293,7 +302,7 @@ impl LineMatch {
             residual.noise.fixed_view_mut::<2, 2>(row, row).copy_from(&noise);
             for kind in 0..2 {
                 let by_ends = by_pose(&p, &by_p[kind]) + by_pose(&q, &by_q[kind]);
-                residual.by_pose.set_row(row + kind, &by_ends.transpose());
+                residual.set_by_pose(row + kind, &by_ends);
                 let (by_p, by_q): (RowVector3<f64>, RowVector3<f64>) =
                     (by_p[kind].transpose(), by_q[kind].transpose());
                 residual.by_landmark.fixed_view_mut::<1, 2>(row + kind, 0).copy_from(&(by_p * across));

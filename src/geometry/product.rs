@@ -16,10 +16,12 @@ pub(crate) fn product<const M: usize, const K: usize, const N: usize>(
     right: &SMatrix<f64, K, N>,
 ) -> SMatrix<f64, M, N> {
     let mut product = SMatrix::<f64, M, N>::zeros();
-    for (sums, factors) in product.data.0.iter_mut().zip(&right.data.0) {
-        for (k, (column, factor)) in left.data.0.iter().zip(factors).enumerate() {
-            for (sum, entry) in sums.iter_mut().zip(column) {
-                *sum = if k == 0 { entry * factor } else { entry * factor + *sum };
+    for column in 0..N {
+        let (sums, factors) = (&mut product.data.0[column], &right.data.0[column]);
+        for k in 0..K {
+            for row in 0..M {
+                let term = left.data.0[k][row] * factors[k];
+                sums[row] = if k == 0 { term } else { term + sums[row] };
             }
         }
     }

@@ -296,8 +296,7 @@ impl Messages {
     fn advance(&mut self) -> Result<Option<Message>, Error> {
         let Self { file, reader } = self;
         let Some(indexed) = reader else { return Ok(None) };
-        let path = file.path().to_owned();
-        guarded(&path, "MCAP", || {
+        guarded(file.path(), "MCAP", || {
             let failed = |error: mcap::McapError| Error::container(file.path(), "MCAP")(error.into());
             loop {
                 let (offset, length) = match indexed.next_event() {

@@ -103,21 +103,33 @@ impl ParquetTableReader {
         });
         let groups: Vec<(usize, u64)> = firsts.enumerate().collect();
         let decoded = Arc::new(AtomicU64::new(0));
+        let read = |(group, row): &(usize, u64), rows: &mut Vec<R>| -> Result<(), Error> {
+            let position = Position { row: *row, decoded: Arc::clone(&decoded) };
+            let mut batches = self.read::<R>(&self.metadata, Some((vec![*group], None)), position)?;
+            while let Some(batch) = batches.next_into(rows) {
+                batch?;
+                check_rows(self.file.path(), R::TABLE, rows.len(), most_rows)?;
+            }
+            Ok(())
+        };
         // What a footer claims may be false, so room is made for what is plausible.
         let mut rows = Vec::with_capacity(self.plausible_rows());
-        for side_by_side in groups.chunks(rayon::current_num_threads()) {
-            let part = |(group, row): &(usize, u64)| {
-                let position = Position { row: *row, decoded: Arc::clone(&decoded) };
-                let mut batches = self.read::<R>(&self.metadata, Some((vec![*group], None)), position)?;
-                let mut rows = Vec::new();
-                while let Some(batch) = batches.next_into(&mut rows) {
-                    batch?;
-                }
-                Ok(rows)
-            };
-            let parts: Vec<Result<Vec<R>, Error>> = side_by_side.par_iter().map(part).collect();
-            for part in parts {
-                rows.append(&mut part?);
+        let threads = rayon::current_num_threads();
+        // The first of those side by side comes where it belongs at once; the others wait, in memory that is used again.
+        let mut waiting: Vec<Vec<R>> = (1..threads).map(|_| Vec::new()).collect();
+        for side_by_side in groups.chunks(threads) {
+            let Some((first, others)) = side_by_side.split_first() else { continue };
+            let (direct, beside) = rayon::join(
+                || read(first, &mut rows),
+                || -> Vec<Result<(), Error>> {
+                    let both = others.par_iter().zip(waiting.par_iter_mut());
+                    both.map(|(group, rows)| read(group, rows)).collect()
+                },
+            );
+            direct?;
+            for (result, waiting) in beside.into_iter().zip(&mut waiting) {
+                result?;
+                rows.append(waiting);
             }
             check_rows(self.file.path(), R::TABLE, rows.len(), most_rows)?;
         }

@@ -14,7 +14,8 @@ use nalgebra::Point3;
 use open_structure::adjust::{Method, Options, SolverOptions, adjust};
 use open_structure::covisibility::{GraphOptions, reprojection_graph};
 use open_structure::format::{self, WriteOptions};
-use open_structure::simulate::{self, Occluders, Survey, View, Visibility, VisibilityModel};
+use open_structure::simulate::visibility::{Occluders, View, Visibility, VisibilityModel};
+use open_structure::simulate::{self, Survey};
 use open_structure::structure::{Frame, MeasuredFrame, MeasurementNoise, PointMeasurement};
 
 /// The names of the kernels, in the order in which they are counted.

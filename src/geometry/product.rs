@@ -11,6 +11,7 @@ use nalgebra::SMatrix;
     clippy::inline_always,
     reason = "the sizes are known where it is called, and unroll the loops there"
 )]
+#[expect(clippy::needless_range_loop, reason = "iterators over both are calls where they are not inlined")]
 pub(crate) fn product<const M: usize, const K: usize, const N: usize>(
     left: &SMatrix<f64, M, K>,
     right: &SMatrix<f64, K, N>,

@@ -29,7 +29,9 @@ fn importing(criterion: &mut Criterion) {
     for (name, folder) in [("sample", Some(sample)), ("office3", office)] {
         let Some(folder) = folder else { continue };
         let limits = Limits::default();
-        let text = || read(&discover(&[folder.clone()], &limits).unwrap().sequences[0], &limits).unwrap();
+        let text = || {
+            read(&discover(std::slice::from_ref(&folder), &limits).unwrap().sequences[0], &limits).unwrap()
+        };
         group.bench_function(format!("text of {name}"), |bencher| bencher.iter(text));
         let found = text();
         group.bench_function(format!("sequence of {name}"), |bencher| {

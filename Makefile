@@ -16,11 +16,12 @@ FUZZ_ARGS ?=
 # Tests, benchmarks and examples stop at what they did not expect, and need not be pretty.
 TESTS_MAY := $(addprefix --allow clippy::,pedantic unwrap_used expect_used print_stdout print_stderr)
 
-.PHONY: help setup demo test lint bench paper-table fuzz conformance-corpus spec
+.PHONY: help setup demo test lint bench bench-baseline bench-figures bench-instructions bench-instructions-baseline paper-table fuzz conformance-corpus spec
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
-	@echo 'make bench | paper-table | fuzz | conformance-corpus | spec | setup'
+	@echo 'make bench | bench-baseline | bench-figures | bench-instructions | bench-instructions-baseline'
+	@echo 'make paper-table | fuzz | conformance-corpus | spec | setup'
 
 setup: ## what the other targets need
 	@.ci/setup
@@ -38,8 +39,24 @@ lint:
 	RUSTDOCFLAGS='--deny warnings' cargo doc --workspace --no-deps --locked
 	@if command -v cargo-deny > /dev/null; then cargo deny check; else .ci/dependencies.py; fi
 
+# Times, as ratios to benches/baseline.json; never fails because something was slow.
 bench:
-	cargo bench --workspace --locked
+	@benches/times
+
+bench-baseline:
+	@benches/times --store
+
+# The figures that the project promises, each a ratio or a bound of one run; fails where a bound does not hold.
+bench-figures:
+	cargo bench --locked --bench figures
+	cargo bench --locked --package open-structure-converters --bench converting
+
+# Instructions of hot kernels, held against benches/instructions/counts.json; needs valgrind.
+bench-instructions:
+	@benches/instructions/count
+
+bench-instructions-baseline:
+	@benches/instructions/count --store
 
 # The paper's table on the sequences of the first release; an hour and more, and it goes on where it was cut off.
 paper-table:

@@ -1,16 +1,14 @@
-//! Throughput of reading and writing, by encoding and kind of numbers, and of simulating, for comparison over
-//! time.
+//! Throughput of reading and writing, by encoding and kind of numbers, for comparison over time.
 
 #[path = "data/mod.rs"]
 #[expect(dead_code, reason = "shared with the figures")]
 mod data;
 
-use std::path::Path;
+use std::time::Duration;
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use open_structure::format::{self, WriteOptions};
-use open_structure::simulate::{self, Simulation};
-use open_structure::structure::{FrameBundle, FrameId, PointMeasurement, Sequence};
+use open_structure::structure::{FrameId, PointMeasurement, Sequence};
 
 /// A quarter of a million noisy rows, and the same with four decimals.
 fn samples() -> [(&'static str, Sequence); 2] {
@@ -28,10 +26,12 @@ fn tables(criterion: &mut Criterion) {
     let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
     for (name, sequence) in samples() {
         let mut group = criterion.benchmark_group(name);
-        group.throughput(Throughput::Elements(sequence.point_measurements.len() as u64)).sample_size(20);
+        group.throughput(Throughput::Elements(sequence.point_measurements.len() as u64));
         for encoding in ["parquet", "mcap"] {
             let path = folder.path().join(format!("{name}.{encoding}"));
             let options = || WriteOptions { force: true, ..WriteOptions::default() };
+            // Reading may be asked for alone.
+            format::write(&path, &sequence, options()).unwrap();
             group.bench_function(format!("write {encoding}"), |bencher| {
                 bencher.iter(|| format::write(&path, &sequence, options()).unwrap());
             });
@@ -62,23 +62,13 @@ fn tables(criterion: &mut Criterion) {
     }
 }
 
-/// Sequences of the paper out of their recipes: scene, path, landmarks, what frames see, and every row.
-#[expect(clippy::unwrap_used, reason = "a benchmark that cannot simulate has nothing to say")]
-fn simulations(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("simulate");
-    for name in ["box1", "corridor1", "sphere1"] {
-        let recipe = simulate::named(name).unwrap();
-        let make = || simulate::simulate(&recipe, Path::new(""), &|_, _, _| ()).unwrap();
-        let rows = |simulation: Simulation| {
-            let observations =
-                |frame: FrameBundle| frame.point_observations.len() + frame.line_observations.len();
-            simulation.bundles().map(observations).sum::<usize>()
-        };
-        group.throughput(Throughput::Elements(rows(make()) as u64)).sample_size(20);
-        group.bench_function(name, |bencher| bencher.iter(|| rows(make())));
-    }
-    group.finish();
+/// Medians over seconds, not minutes: all of them together are meant to run often.
+fn brief() -> Criterion {
+    Criterion::default()
+        .sample_size(10)
+        .warm_up_time(Duration::from_millis(500))
+        .measurement_time(Duration::from_secs(2))
 }
 
-criterion_group!(benches, tables, simulations);
+criterion_group!(name = benches; config = brief(); targets = tables);
 criterion_main!(benches);

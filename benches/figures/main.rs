@@ -7,11 +7,18 @@
 
 #[path = "../data/mod.rs"]
 mod data;
+#[path = "../data/simulated.rs"]
+#[expect(dead_code, reason = "shared with the criterion benches")]
+mod simulated;
+
+mod against_json;
+mod against_pyarrow;
 mod figure;
 mod reading;
 mod scale;
 mod simulating;
 mod size;
+mod tracking;
 mod validating;
 
 use std::process::ExitCode;
@@ -28,8 +35,11 @@ fn main() -> Result<ExitCode> {
     }
     let wanted: Vec<String> =
         std::env::args().skip(1).filter(|argument| !argument.starts_with('-')).collect();
-    let all: [(&str, Measure); 5] = [
+    let all: [(&str, Measure); 8] = [
         ("reading", reading::measure),
+        ("pyarrow", against_pyarrow::measure),
+        ("json", against_json::measure),
+        ("tracking", tracking::measure),
         ("size", size::measure),
         ("validating", validating::measure),
         ("scale", scale::measure),

@@ -1,7 +1,6 @@
 //! How fast measurements come into memory.
 
 use std::path::Path;
-use std::process::Command;
 
 use anyhow::{Result, ensure};
 use open_structure::format::{self, WriteOptions};
@@ -42,9 +41,6 @@ fn points(figures: &mut Figures, name: &str, sequence: &Sequence, folder: &Path)
         let speed = sequence.point_measurements.len() as f64 / time.as_secs_f64() / 1e6;
         let bound = if encoding == "parquet" { Bound::AtLeast(10.0) } else { Bound::None };
         figures.add(format!("reading {name}, {encoding}, one core"), speed, "million rows/s", bound);
-        if encoding == "parquet" {
-            pyarrow(figures, name, &path.join("point_measurements.parquet"))?;
-        }
     }
     Ok(())
 }
@@ -75,37 +71,7 @@ fn against_text(figures: &mut Figures, file: &Published, folder: &Path) -> Resul
     Ok(())
 }
 
-/// What pyarrow needs for the same file, where it is installed.
-fn pyarrow(figures: &mut Figures, name: &str, path: &Path) -> Result<()> {
-    let python = Path::new(env!("CARGO_MANIFEST_DIR")).join(".venv/bin/python");
-    let program = "
-import sys, time
-import pyarrow as pa, pyarrow.parquet as pq
-pa.set_cpu_count(1)
-times = []
-for _ in range(16):
-    start = time.perf_counter()
-    table = pq.read_table(sys.argv[1], use_threads=False)
-    times.append(time.perf_counter() - start)
-print(table.num_rows / sorted(times[1:])[7] / 1e6)
-";
-    let output = Command::new(python).args(["-c", program]).arg(path).output();
-    match output {
-        Ok(output) if output.status.success() => {
-            let speed: f64 = String::from_utf8(output.stdout)?.trim().parse()?;
-            figures.add(
-                format!("pyarrow.parquet.read_table of {name}, one core, columns"),
-                speed,
-                "million rows/s",
-                Bound::None,
-            );
-        }
-        _ => eprintln!("SKIPPED: pyarrow, which is not in .venv"),
-    }
-    Ok(())
-}
-
 /// Runs with one thread, whatever the machine has.
-fn one_core<T: Send>(run: impl FnOnce() -> T + Send) -> Result<T> {
+pub(crate) fn one_core<T: Send>(run: impl FnOnce() -> T + Send) -> Result<T> {
     Ok(rayon::ThreadPoolBuilder::new().num_threads(1).build()?.install(run))
 }

@@ -23,28 +23,31 @@ pub(super) fn frame_topics() -> Vec<String> {
 /// Rows of one table that wait for their frame.
 struct TableCursor<R> {
     batches: Option<ParquetBatches>,
-    ahead: VecDeque<R>,
+    ahead: std::vec::IntoIter<R>,
 }
 
 impl<R: Record> TableCursor<R> {
     fn new(tables: &BTreeMap<&'static str, ParquetTableReader>) -> Result<Self, Error> {
         let batches = tables.get(R::TABLE.name).map(ParquetTableReader::batches::<R>).transpose()?;
-        Ok(Self { batches, ahead: VecDeque::new() })
+        Ok(Self { batches, ahead: Vec::new().into_iter() })
     }
 
     /// Rows of a frame; rows of earlier frames, which are not in the list, are passed over.
     fn take(&mut self, frame_id: FrameId) -> Result<Vec<R>, Error> {
         let mut rows = Vec::new();
         loop {
-            while let Some(row) = self.ahead.front() {
-                match row.frame().cmp(&Some(frame_id)) {
-                    std::cmp::Ordering::Greater => return Ok(rows),
-                    std::cmp::Ordering::Equal => rows.extend(self.ahead.pop_front()),
-                    std::cmp::Ordering::Less => drop(self.ahead.pop_front()),
+            // As it should be: what comes first is of this frame, and moves in one piece.
+            let here = self.ahead.as_slice().iter().take_while(|row| row.frame() == Some(frame_id)).count();
+            rows.extend(self.ahead.by_ref().take(here));
+            if let Some(row) = self.ahead.as_slice().first() {
+                if row.frame() > Some(frame_id) {
+                    return Ok(rows);
                 }
+                self.ahead.next();
+                continue;
             }
             match self.batches.as_mut().and_then(ParquetBatches::next_rows::<R>) {
-                Some(batch) => self.ahead = batch?.into(),
+                Some(batch) => self.ahead = batch?.into_iter(),
                 None => return Ok(rows),
             }
         }

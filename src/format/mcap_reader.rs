@@ -5,6 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 
+use arrow::array::RecordBatch;
 use arrow::datatypes::SchemaRef;
 use mcap::Summary;
 use mcap::sans_io::indexed_reader::{IndexedReadEvent, IndexedReader, IndexedReaderOptions};
@@ -20,7 +21,7 @@ use super::mcap_survey::McapSurvey;
 use super::reader::Damaged;
 use super::stored_table::StoredTable;
 use super::{Error, names};
-use crate::structure::{Manifest, Record, TableSummary, table_info};
+use crate::structure::{Manifest, Record, TableInfo, TableSummary, table_info};
 
 /// Largest chunk that is decompressed; writers keep to a few MiB.
 pub(super) const MAX_CHUNK_BYTES: u64 = 1 << 29;
@@ -197,26 +198,34 @@ impl McapReader {
         first_row: u64,
         rows: &mut Vec<R>,
     ) -> Result<bool, Error> {
-        let Some(channel) = self
-            .channels
-            .get(R::TABLE.name)
-            .into_iter()
-            .flatten()
-            .find(|channel| channel.id == message.channel)
-        else {
-            return Ok(false);
-        };
+        let make = |batch: &RecordBatch| from_batch(batch, first_row, rows);
+        Ok(self.batch_as(message, R::TABLE, make)?.is_some())
+    }
+
+    /// The columns of one message, if it is one of the table.
+    pub(super) fn columns(&self, message: Message, table: &TableInfo) -> Result<Option<RecordBatch>, Error> {
+        self.batch_as(message, table, |batch| Ok(batch.clone()))
+    }
+
+    /// What is made of the record batch of one message, if it is one of the table.
+    fn batch_as<T>(
+        &self,
+        message: Message,
+        table: &TableInfo,
+        make: impl FnOnce(&RecordBatch) -> Result<T, Error>,
+    ) -> Result<Option<T>, Error> {
+        let mut channels = self.channels.get(table.name).into_iter().flatten();
+        let Some(channel) = channels.find(|channel| channel.id == message.channel) else { return Ok(None) };
         guarded(self.path(), "Arrow", || {
             let Message { log_time, data, .. } = message;
             let batch =
                 decode_batch(data, Arc::clone(&channel.schema)).map_err(|error| Error::Container {
                     path: self.path().to_owned(),
                     container: "Arrow",
-                    detail: format!("{} message at {log_time} ns: {error}", R::TABLE.name),
+                    detail: format!("{} message at {log_time} ns: {error}", table.name),
                 })?;
-            from_batch(&batch, first_row, rows)
-        })?;
-        Ok(true)
+            make(&batch).map(Some)
+        })
     }
 
     /// Reads the whole file once and checks every CRC of the container.
@@ -287,8 +296,7 @@ impl Messages {
     fn advance(&mut self) -> Result<Option<Message>, Error> {
         let Self { file, reader } = self;
         let Some(indexed) = reader else { return Ok(None) };
-        let path = file.path().to_owned();
-        guarded(&path, "MCAP", || {
+        guarded(file.path(), "MCAP", || {
             let failed = |error: mcap::McapError| Error::container(file.path(), "MCAP")(error.into());
             loop {
                 let (offset, length) = match indexed.next_event() {

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::AtomicU64;
+use std::sync::atomic::{AtomicU64, Ordering};
 
+use arrow::array::RecordBatch;
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{
     ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder,
@@ -12,6 +13,7 @@ use parquet::arrow::arrow_reader::{
 use parquet::file::metadata::{PageIndexPolicy, ParquetMetaData};
 use parquet::file::page_index::column_index::ColumnIndexMetaData;
 use parquet::file::statistics::Statistics;
+use rayon::prelude::*;
 
 use super::Error;
 use super::arrow_batch::from_batch;
@@ -88,7 +90,50 @@ impl ParquetTableReader {
 
     /// Rows from the beginning, batch by batch.
     pub(super) fn batches<R: Record>(&self) -> Result<ParquetBatches, Error> {
-        self.read::<R>(&self.metadata, None)
+        self.read::<R>(&self.metadata, None, Position::default())
+    }
+
+    /// All rows, no more than `most_rows`, the row groups side by side on all cores.
+    pub(super) fn rows<R: Record>(&self, most_rows: u64) -> Result<Vec<R>, Error> {
+        let groups = self.footer().row_groups();
+        let firsts = groups.iter().scan(0, |first, group| {
+            let begin = *first;
+            *first += u64::try_from(group.num_rows()).unwrap_or(0);
+            Some(begin)
+        });
+        let groups: Vec<(usize, u64)> = firsts.enumerate().collect();
+        let decoded = Arc::new(AtomicU64::new(0));
+        let read = |(group, row): &(usize, u64), rows: &mut Vec<R>| -> Result<(), Error> {
+            let position = Position { row: *row, decoded: Arc::clone(&decoded) };
+            let mut batches = self.read::<R>(&self.metadata, Some((vec![*group], None)), position)?;
+            while let Some(batch) = batches.next_into(rows) {
+                batch?;
+                check_rows(self.file.path(), R::TABLE, rows.len(), most_rows)?;
+            }
+            Ok(())
+        };
+        // What a footer claims may be false, so room is made for what is plausible.
+        let mut rows = Vec::with_capacity(self.plausible_rows());
+        let threads = rayon::current_num_threads();
+        // The first of those side by side comes where it belongs at once; the others wait, in memory that is used again.
+        let mut waiting: Vec<Vec<R>> = (1..threads).map(|_| Vec::new()).collect();
+        for side_by_side in groups.chunks(threads) {
+            let Some((first, others)) = side_by_side.split_first() else { continue };
+            let (direct, beside) = rayon::join(
+                || read(first, &mut rows),
+                || -> Vec<Result<(), Error>> {
+                    let both = others.par_iter().zip(waiting.par_iter_mut());
+                    both.map(|(group, rows)| read(group, rows)).collect()
+                },
+            );
+            direct?;
+            for (result, waiting) in beside.into_iter().zip(&mut waiting) {
+                result?;
+                rows.append(waiting);
+            }
+            check_rows(self.file.path(), R::TABLE, rows.len(), most_rows)?;
+        }
+        Ok(rows)
     }
 
     /// Only the pages that may hold rows of a frame.
@@ -107,7 +152,11 @@ impl ParquetTableReader {
             })
             .collect();
         if groups.is_empty() {
-            return Ok(ParquetBatches { file: self.file.clone(), reader: None, row: 0, decoded: 0 });
+            return Ok(ParquetBatches {
+                file: self.file.clone(),
+                reader: None,
+                position: Position::default(),
+            });
         }
         guarded(path, "Parquet", || {
             let options = ArrowReaderOptions::new()
@@ -119,7 +168,7 @@ impl ParquetTableReader {
                 .iter()
                 .flat_map(|group| pages(metadata.metadata(), *group, column, frame_id))
                 .collect();
-            self.read::<R>(&metadata, Some((groups.clone(), selection)))
+            self.read::<R>(&metadata, Some((groups.clone(), Some(selection))), Position::default())
         })
     }
 
@@ -131,7 +180,8 @@ impl ParquetTableReader {
     fn read<R: Record>(
         &self,
         metadata: &ArrowReaderMetadata,
-        part: Option<(Vec<usize>, Vec<RowSelector>)>,
+        part: Option<(Vec<usize>, Option<Vec<RowSelector>>)>,
+        position: Position,
     ) -> Result<ParquetBatches, Error> {
         let path = self.file.path();
         guarded(path, "Parquet", || {
@@ -149,10 +199,13 @@ impl ParquetTableReader {
                     .with_batch_size(batch_rows(R::TABLE))
                     .with_projection(mask);
             if let Some((groups, selection)) = part {
-                builder = builder.with_row_groups(groups).with_row_selection(RowSelection::from(selection));
+                builder = builder.with_row_groups(groups);
+                if let Some(selection) = selection {
+                    builder = builder.with_row_selection(RowSelection::from(selection));
+                }
             }
             let reader = builder.build().map_err(|error| Error::container(path, "Parquet")(error.into()))?;
-            Ok(ParquetBatches { file: self.file.clone(), reader: Some(reader), row: 0, decoded: 0 })
+            Ok(ParquetBatches { file: self.file.clone(), reader: Some(reader), position })
         })
     }
 }
@@ -208,13 +261,33 @@ fn pages(metadata: &ParquetMetaData, group: usize, column: usize, frame_id: Fram
         .collect()
 }
 
+/// Refuses more rows than are held in memory at once.
+pub(super) fn check_rows(path: &Path, table: &TableInfo, rows: usize, most_rows: u64) -> Result<(), Error> {
+    if rows as u64 <= most_rows {
+        return Ok(());
+    }
+    Err(Error::TooLarge {
+        path: path.to_owned(),
+        what: format!("row count of {}", table.name),
+        found: rows as u64,
+        limit: most_rows,
+    })
+}
+
+/// How far a file is read.
+#[derive(Debug, Default)]
+struct Position {
+    /// Number of the next row, for messages.
+    row: u64,
+    /// Bytes of the file's columns decoded so far, by all who read it together.
+    decoded: Arc<AtomicU64>,
+}
+
 /// Rows of a table, batch by batch.
 pub(super) struct ParquetBatches {
     file: CountedFile,
     reader: Option<ParquetRecordBatchReader>,
-    row: u64,
-    /// Bytes of the columns decoded so far.
-    decoded: u64,
+    position: Position,
 }
 
 impl ParquetBatches {
@@ -226,26 +299,40 @@ impl ParquetBatches {
 
     /// Appends the next rows; `None` at the end.
     pub(super) fn next_into<R: Record>(&mut self, rows: &mut Vec<R>) -> Option<Result<(), Error>> {
-        let Self { file, reader, row, decoded } = self;
+        self.next_as(|batch, first_row| from_batch(batch, first_row, rows))
+    }
+
+    /// The next rows as columns; `None` at the end.
+    pub(super) fn next_columns(&mut self) -> Option<Result<RecordBatch, Error>> {
+        self.next_as(|batch, _| Ok(batch.clone()))
+    }
+
+    /// What is made of the next batch and the number of its first row; `None` at the end.
+    fn next_as<T>(
+        &mut self,
+        make: impl FnOnce(&RecordBatch, u64) -> Result<T, Error>,
+    ) -> Option<Result<T, Error>> {
+        let Self { file, reader, position: Position { row, decoded } } = self;
         let path = file.path();
         let limit = file.length().saturating_mul(MAX_RATIO).saturating_add(ALWAYS_PERMITTED_BYTES);
         let result = guarded(path, "Parquet", || match reader.as_mut().and_then(Iterator::next) {
             None => Ok(None),
             Some(batch) => {
                 let batch = batch.map_err(|error| Error::container(path, "Parquet")(error.into()))?;
-                *decoded = decoded.saturating_add(batch.get_array_memory_size() as u64);
-                if *decoded > limit {
+                let bytes = batch.get_array_memory_size() as u64;
+                let found = decoded.fetch_add(bytes, Ordering::Relaxed).saturating_add(bytes);
+                if found > limit {
                     // A few bytes of dictionary and of run lengths can stand for any number of long values.
                     return Err(Error::TooLarge {
                         path: path.to_owned(),
                         what: "decoded size of the columns".to_owned(),
-                        found: *decoded,
+                        found,
                         limit,
                     });
                 }
-                from_batch(&batch, *row, rows)?;
+                let made = make(&batch, *row)?;
                 *row += batch.num_rows() as u64;
-                Ok(Some(()))
+                Ok(Some(made))
             }
         })
         .transpose();

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use arrow::array::RecordBatch;
 use arrow::compute::concat_batches;
-use arrow::datatypes::{DataType, SchemaRef};
+use arrow::datatypes::{DataType, FieldRef, Schema, SchemaRef};
 use parquet::arrow::arrow_writer::{
     ArrowColumnChunk, ArrowColumnWriter, ArrowRowGroupWriterFactory, compute_leaves,
 };
@@ -15,7 +15,7 @@ use parquet::arrow::{ArrowSchemaConverter, add_encoded_arrow_schema_to_metadata}
 use parquet::basic::{Compression, Encoding, ZstdLevel};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::{KeyValue, SortingColumn};
-use parquet::file::properties::{EnabledStatistics, WriterProperties};
+use parquet::file::properties::{EnabledStatistics, WriterProperties, WriterPropertiesBuilder};
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::ColumnPath;
 use rayon::prelude::*;
@@ -86,34 +86,16 @@ impl Layout {
             _ => &[Self::Dictionary],
         }
     }
-
-    const ALL: [Self; 4] = [Self::Dictionary, Self::ByteStreamSplit, Self::Delta, Self::Plain];
 }
 
-fn properties(
-    table: &TableInfo,
-    schema: &SchemaRef,
-    layout: Layout,
-    pairs: &[(String, String)],
-) -> Result<WriterProperties, ParquetError> {
-    let key_values = pairs.iter().map(|(key, value)| KeyValue::new(key.clone(), value.clone())).collect();
-    // Key columns are leaves of their own, so the index of a field is the index of its leaf.
-    let sorting = table
-        .key
-        .iter()
-        .filter_map(|key| table.fields.iter().position(|field| field.name == *key))
-        .filter_map(|index| i32::try_from(index).ok())
-        .map(|column_idx| SortingColumn { column_idx, descending: false, nulls_first: false })
-        .collect();
+/// What a column chunk of a layout depends on.
+fn chunk_properties(schema: &Schema, layout: Layout) -> Result<WriterPropertiesBuilder, ParquetError> {
     let mut properties = WriterProperties::builder()
-        .set_created_by(format!("open-structure {}", env!("CARGO_PKG_VERSION")))
         .set_compression(Compression::ZSTD(layout.level()?))
         .set_statistics_enabled(EnabledStatistics::Page)
         .set_data_page_row_count_limit(PAGE_ROWS)
         .set_dictionary_page_size_limit(DICTIONARY_BYTES)
-        .set_max_row_group_row_count(Some(ROW_GROUP_ROWS))
-        .set_key_value_metadata(Some(key_values))
-        .set_sorting_columns(Some(sorting));
+        .set_max_row_group_row_count(Some(ROW_GROUP_ROWS));
     let fields =
         schema.fields().iter().filter(|field| Layout::candidates(field.data_type()).contains(&layout));
     for field in fields.filter(|_| layout != Layout::Dictionary) {
@@ -126,32 +108,63 @@ fn properties(
             .set_column_dictionary_enabled(leaf.clone(), false)
             .set_column_encoding(leaf, layout.encoding());
     }
-    let mut properties = properties.build();
+    Ok(properties)
+}
+
+/// What the whole file of a table is written with; `pairs` are its key-value metadata.
+fn file_properties(
+    table: &TableInfo,
+    schema: &SchemaRef,
+    pairs: &[(String, String)],
+) -> Result<WriterProperties, ParquetError> {
+    let key_values = pairs.iter().map(|(key, value)| KeyValue::new(key.clone(), value.clone())).collect();
+    // Key columns are leaves of their own, so the index of a field is the index of its leaf.
+    let sorting = table
+        .key
+        .iter()
+        .filter_map(|key| table.fields.iter().position(|field| field.name == *key))
+        .filter_map(|index| i32::try_from(index).ok())
+        .map(|column_idx| SortingColumn { column_idx, descending: false, nulls_first: false })
+        .collect();
+    let mut properties = chunk_properties(schema, Layout::Dictionary)?
+        .set_created_by(format!("open-structure {}", env!("CARGO_PKG_VERSION")))
+        .set_key_value_metadata(Some(key_values))
+        .set_sorting_columns(Some(sorting))
+        .build();
     add_encoded_arrow_schema_to_metadata(schema, &mut properties);
     Ok(properties)
 }
 
-/// Makes column writers of one layout.
+/// Makes writers of one column in one layout.
+///
+/// A schema of that column alone, for a factory makes the writers of all its columns at once, each with
+/// the memory of a compressor and a decompressor.
 struct LayoutFactory {
     factory: ArrowRowGroupWriterFactory,
     layout: Layout,
 }
 
 impl LayoutFactory {
-    fn new(table: &TableInfo, schema: &SchemaRef, layout: Layout) -> Result<Self, ParquetError> {
+    fn new(field: &FieldRef, layout: Layout) -> Result<Self, ParquetError> {
+        let schema = Arc::new(Schema::new(vec![Arc::clone(field)]));
         // A factory takes its properties from a file writer; this one writes nothing.
-        let root = ArrowSchemaConverter::new().convert(schema)?.root_schema_ptr();
-        let properties = Arc::new(properties(table, schema, layout, &[])?);
+        let root = ArrowSchemaConverter::new().convert(&schema)?.root_schema_ptr();
+        let properties = Arc::new(chunk_properties(&schema, layout)?.build());
         let writer: SerializedFileWriter<Sink> = SerializedFileWriter::new(sink(), root, properties)?;
-        Ok(Self { factory: ArrowRowGroupWriterFactory::new(&writer, Arc::clone(schema)), layout })
+        Ok(Self { factory: ArrowRowGroupWriterFactory::new(&writer, schema), layout })
     }
 
-    fn column_writer(&self, row_group: usize, column: usize) -> Result<ArrowColumnWriter, ParquetError> {
+    /// The layouts worth trying for a column.
+    fn candidates(field: &FieldRef) -> Result<Vec<Self>, ParquetError> {
+        Layout::candidates(field.data_type()).iter().map(|layout| Self::new(field, *layout)).collect()
+    }
+
+    fn column_writer(&self, row_group: usize) -> Result<ArrowColumnWriter, ParquetError> {
+        // Every column of ours has one leaf.
         self.factory
             .create_column_writers(row_group)?
-            .into_iter()
-            .nth(column)
-            .ok_or_else(|| ParquetError::General(format!("no column {column}")))
+            .pop()
+            .ok_or_else(|| ParquetError::General(format!("no writer for {:?}", self.layout)))
     }
 }
 
@@ -160,7 +173,8 @@ pub(super) struct ParquetTableWriter {
     path: PathBuf,
     schema: SchemaRef,
     writer: SerializedFileWriter<BufWriter<File>>,
-    factories: Vec<LayoutFactory>,
+    /// Of each column.
+    factories: Vec<Vec<LayoutFactory>>,
     pending: Vec<RecordBatch>,
     pending_rows: usize,
     pending_bytes: usize,
@@ -183,12 +197,10 @@ impl ParquetTableWriter {
         let schema = arrow_schema(table);
         let make = || -> Result<_, ParquetError> {
             let root = ArrowSchemaConverter::new().convert(&schema)?.root_schema_ptr();
-            let properties = Arc::new(properties(table, &schema, Layout::Dictionary, pairs)?);
+            let properties = Arc::new(file_properties(table, &schema, pairs)?);
             let writer = SerializedFileWriter::new(BufWriter::new(file), root, properties)?;
-            let factories = Layout::ALL
-                .iter()
-                .map(|layout| LayoutFactory::new(table, &schema, *layout))
-                .collect::<Result<_, _>>()?;
+            let factories =
+                schema.fields().iter().map(LayoutFactory::candidates).collect::<Result<_, _>>()?;
             Ok((writer, factories))
         };
         let (writer, factories) = make().map_err(|error| Error::container(path, "Parquet")(error.into()))?;
@@ -237,7 +249,7 @@ impl ParquetTableWriter {
                 .into_par_iter()
                 .map(|column| {
                     let before = self.chosen.get(column).filter(|_| !compare).copied();
-                    encode(&self.factories, self.row_groups, &batch, column, before)
+                    encode(&self.factories[column], self.row_groups, &batch, column, before)
                 })
                 .collect::<Result<_, _>>()?;
             let (chunks, chosen): (Vec<_>, Vec<_>) = columns.into_iter().unzip();
@@ -278,7 +290,7 @@ fn encode(
     let field = schema.field(column);
     let leaves = compute_leaves(field, batch.column(column))?;
     let with = |factory: &LayoutFactory| -> Result<(ArrowColumnChunk, Choice), ParquetError> {
-        let mut writer = factory.column_writer(row_group, column)?;
+        let mut writer = factory.column_writer(row_group)?;
         for leaf in &leaves {
             writer.write(leaf)?;
         }
@@ -296,9 +308,7 @@ fn encode(
             best = Some((chunk, found));
         }
     }
-    for factory in
-        factories.iter().filter(|factory| Layout::candidates(field.data_type()).contains(&factory.layout))
-    {
+    for factory in factories {
         if best.as_ref().is_some_and(|(_, best)| best.layout == factory.layout) {
             continue;
         }

@@ -12,7 +12,8 @@ use super::encoding::Encoding;
 use super::frames::{Cursors, FrameSource, Frames, frame_topics, take_into};
 use super::mcap_reader::McapReader;
 use super::mcap_survey::McapSurvey;
-use super::parquet_reader::ParquetTableReader;
+use super::parquet_reader::{ParquetTableReader, check_rows};
+use super::record_batches::RecordBatches;
 use super::stored_table::StoredTable;
 use super::{Error, names};
 use crate::structure::{
@@ -214,25 +215,39 @@ impl SequenceReader {
     /// [`Error::MissingColumn`], [`Error::ColumnType`], [`Error::Null`], [`Error::Container`];
     /// [`Error::TooLarge`] when the rows do not fit into memory.
     pub fn table<R: Record>(&self) -> Result<Vec<R>, Error> {
-        // What a footer claims may be false, so room is made for what is plausible.
-        let claimed = match &self.backend {
-            Backend::Mcap(_) => None,
-            Backend::Parquet(tables) => tables.get(R::TABLE.name).map(ParquetTableReader::plausible_rows),
-        };
-        let mut rows = Vec::with_capacity(claimed.unwrap_or(0));
+        if let Backend::Parquet(tables) = &self.backend {
+            return match tables.get(R::TABLE.name) {
+                Some(table) => table.rows(MAX_ROWS_IN_MEMORY),
+                None => Ok(Vec::new()),
+            };
+        }
+        let mut rows = Vec::new();
         let mut batches = self.batches::<R>()?;
         while let Some(batch) = batches.next_into(&mut rows) {
             batch?;
-            if rows.len() as u64 > MAX_ROWS_IN_MEMORY {
-                return Err(Error::TooLarge {
-                    path: self.path.clone(),
-                    what: format!("row count of {}", R::TABLE.name),
-                    found: rows.len() as u64,
-                    limit: MAX_ROWS_IN_MEMORY,
-                });
-            }
+            check_rows(&self.path, R::TABLE, rows.len(), MAX_ROWS_IN_MEMORY)?;
         }
         Ok(rows)
+    }
+
+    /// Columns of a table in stored order, a batch at a time, for whoever has no use for rows.
+    ///
+    /// Those of this version of the specification alone, by their names; an optional one may not be there.
+    ///
+    /// ```no_run
+    /// use open_structure::structure::PointMeasurement;
+    ///
+    /// let sequence = open_structure::format::open("box1")?;
+    /// for batch in sequence.record_batches::<PointMeasurement>()? {
+    ///     println!("{} rows", batch?.num_rows());
+    /// }
+    /// # Ok::<(), open_structure::format::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::Container`]; each batch may bring its own. Types and nulls are not looked at.
+    pub fn record_batches<R: Record>(&self) -> Result<RecordBatches<'_>, Error> {
+        Ok(RecordBatches::new(self.source::<R>()?, R::TABLE))
     }
 
     /// Rows of a table in stored order, a batch at a time.
@@ -240,7 +255,11 @@ impl SequenceReader {
     /// # Errors
     /// As [`table`](Self::table); each batch may bring its own.
     pub fn batches<R: Record>(&self) -> Result<Batches<'_, R>, Error> {
-        let source = match &self.backend {
+        Ok(Batches::new(self.source::<R>()?))
+    }
+
+    fn source<R: Record>(&self) -> Result<BatchSource<'_>, Error> {
+        Ok(match &self.backend {
             Backend::Mcap(reader) => {
                 BatchSource::Mcap(reader, Box::new(reader.messages([R::TABLE.topic()], None)?))
             }
@@ -248,8 +267,7 @@ impl SequenceReader {
                 Some(table) => BatchSource::Parquet(Box::new(table.batches::<R>()?)),
                 None => BatchSource::Empty,
             },
-        };
-        Ok(Batches::new(source))
+        })
     }
 
     /// Every table.

@@ -2,10 +2,11 @@
 
 use super::camera::NEAREST_Z;
 use super::direction::perpendicular;
+use super::product::product;
 use super::{PinholeCamera, Pose, Segment};
 use nalgebra::{
-    Matrix2, Matrix3, Matrix3x2, Matrix3x6, Matrix4, Point2, Point3, RowVector3, SMatrix, SVector, Vector2,
-    Vector3,
+    Matrix2, Matrix3, Matrix3x2, Matrix4, Point2, Point3, RowVector3, SMatrix, SVector, Vector2, Vector3,
+    Vector6,
 };
 
 /// A depth along the optical axis (z), and the space in which its noise is normal.
@@ -72,6 +73,7 @@ pub struct Residual<const M: usize, const L: usize> {
 }
 
 impl<const M: usize, const L: usize> Residual<M, L> {
+    #[inline]
     fn empty() -> Self {
         Self {
             error: SVector::zeros(),
@@ -82,10 +84,18 @@ impl<const M: usize, const L: usize> Residual<M, L> {
         }
     }
 
+    #[inline]
+    fn set_by_pose(&mut self, row: usize, derivative: &Vector6<f64>) {
+        for number in 0..6 {
+            self.by_pose[(row, number)] = derivative[number];
+        }
+    }
+
     /// `noise + J_X Σ J_Xᵀ`: the covariance of the error where the landmark has the covariance Σ and the pose is exact.
     #[must_use]
     pub fn covariance(&self, landmark: &SMatrix<f64, L, L>) -> SMatrix<f64, M, M> {
-        self.noise + self.by_landmark * landmark * self.by_landmark.transpose()
+        let spread = product(&self.by_landmark, landmark);
+        self.noise + product(&spread, &self.by_landmark.transpose())
     }
 }
 
@@ -142,6 +152,7 @@ impl PointMatch {
     /// * `sigma_px` — standard deviation of u and of v, pixels.
     ///
     /// `None` when the point is not in front of the camera.
+    #[inline]
     #[must_use]
     pub fn residual(
         &self,
@@ -180,18 +191,20 @@ impl PointMatch {
             residual.noise[(2, 2)] = sigma * sigma;
             residual.count = 3;
         }
-        residual.by_pose = by_seen * moved_by_pose(&seen);
-        residual.by_landmark = by_seen * rotation;
+        for row in 0..3 {
+            let by_seen = Vector3::new(by_seen[(row, 0)], by_seen[(row, 1)], by_seen[(row, 2)]);
+            residual.set_by_pose(row, &by_pose(&seen, &by_seen));
+        }
+        residual.by_landmark = product(&by_seen, &rotation);
         residual.error.iter().all(|error| error.is_finite()).then_some(residual)
     }
 }
 
-/// `[−[p]ₓ, I]`: how a point in the camera moves with the pose's tangent.
-fn moved_by_pose(point: &Vector3<f64>) -> Matrix3x6<f64> {
-    let mut moved = Matrix3x6::zeros();
-    moved.fixed_view_mut::<3, 3>(0, 0).copy_from(&-point.cross_matrix());
-    moved.fixed_view_mut::<3, 3>(0, 3).fill_with_identity();
-    moved
+/// `[p × g; g]`: how a number moves with the pose's tangent that has the derivative g by a point p in the camera.
+#[inline]
+fn by_pose(point: &Vector3<f64>, by_point: &Vector3<f64>) -> Vector6<f64> {
+    let turn = point.cross(by_point);
+    Vector6::new(turn.x, turn.y, turn.z, by_point.x, by_point.y, by_point.z)
 }
 
 /// A line and where one frame measured a segment of it.
@@ -239,7 +252,6 @@ impl LineMatch {
         let translation = camera_from_world.translation();
         let p = rotation * self.segment.start.coords + translation;
         let q = rotation * self.segment.end.coords + translation;
-        let (moved_p, moved_q) = (moved_by_pose(&p), moved_by_pose(&q));
         let across = rotation * across;
         let (d, n) = (q - p, p.cross(&q));
         let matrix = camera.line_matrix();
@@ -289,9 +301,10 @@ impl LineMatch {
             }
             residual.noise.fixed_view_mut::<2, 2>(row, row).copy_from(&noise);
             for kind in 0..2 {
+                let by_ends = by_pose(&p, &by_p[kind]) + by_pose(&q, &by_q[kind]);
+                residual.set_by_pose(row + kind, &by_ends);
                 let (by_p, by_q): (RowVector3<f64>, RowVector3<f64>) =
                     (by_p[kind].transpose(), by_q[kind].transpose());
-                residual.by_pose.set_row(row + kind, &(by_p * moved_p + by_q * moved_q));
                 residual.by_landmark.fixed_view_mut::<1, 2>(row + kind, 0).copy_from(&(by_p * across));
                 residual.by_landmark.fixed_view_mut::<1, 2>(row + kind, 2).copy_from(&(by_q * across));
             }

@@ -32,8 +32,13 @@ impl<const N: usize> Normal<N> {
     /// Adds one residual with its derivative by the parameters.
     pub(super) fn add(&mut self, residual: f64, derivative: &SVector<f64, N>) {
         self.cost += 0.5 * residual * residual;
-        self.gradient.axpy(residual, derivative, 1.0);
-        self.hessian.ger(1.0, derivative, derivative, 1.0);
+        // Written out, for BLAS's shape is a call for each column of three entries or six.
+        for column in 0..N {
+            self.gradient[column] += residual * derivative[column];
+            for row in 0..N {
+                self.hessian[(row, column)] += derivative[column] * derivative[row];
+            }
+        }
     }
 
     /// Solves `(H + damping · diag H) δ = −g`; gives `δ` and `√(δᵀ diag(H) δ)`, the size of the step in units of the residual.

@@ -2,6 +2,7 @@
 
 use super::landmark_match::whitening;
 use super::least_squares::{Normal, minimise};
+use super::product::product;
 use super::{Error, LineMatch, PinholeCamera, PointMatch, Pose, Residual, RobustLoss};
 use nalgebra::linalg::SymmetricEigen;
 use nalgebra::{Matrix3, Matrix4, Matrix6, SMatrix, Vector6};
@@ -147,8 +148,8 @@ impl<'a> Problem<'a> {
         residual: &Residual<M, L>,
         weight: &SMatrix<f64, M, M>,
     ) {
-        let error = weight * residual.error;
-        let by_pose = weight * residual.by_pose;
+        let error = product(weight, &residual.error);
+        let by_pose = product(weight, &residual.by_pose);
         let [rho, slope] = self.loss.at(error.norm_squared());
         normal.cost += 0.5 * rho;
         let gradient: Vector6<f64> = by_pose.tr_mul(&error);

@@ -76,7 +76,8 @@ pub fn triangulate_line(observations: &[LineView]) -> Option<LineTriangulation> 
         let centre = centre_of(&view.1);
         (line.closest_point_to(centre) - centre).cross(&line.direction)
     };
-    let parallax = widest_angle(&used(), |a, b| unsigned_angle(&plane(a), &plane(b)));
+    let planes: Vec<Vector3<f64>> = used().map(plane).collect();
+    let parallax = widest_angle(&planes.iter(), unsigned_angle);
     let rms_px = (cost / count as f64).sqrt();
     let skipped = observations.len() - count;
     (parallax >= LEAST_PARALLAX).then_some(LineTriangulation { line, rms_px, parallax, count, skipped })

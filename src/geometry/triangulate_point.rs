@@ -5,7 +5,7 @@ use super::direction::angle;
 use super::least_squares::{Normal, minimise};
 use super::parallax::{LEAST_PARALLAX, is_one_place, widest_angle};
 use super::{PinholeCamera, Pose};
-use nalgebra::{Point2, Point3, Vector3};
+use nalgebra::{Matrix3, Point2, Point3, Vector3};
 
 /// One observation of a point: camera, `camera_from_world`, pixel.
 pub type PointView = (PinholeCamera, Pose, Point2<f64>);
@@ -47,9 +47,9 @@ pub fn triangulate_point(observations: &[PointView]) -> Option<Triangulation> {
         return None;
     }
 
-    let start = linear(observations, &world_from_first)?;
-    let reprojection = |place: &Vector3<f64>| reprojection(observations, &world_from_first, place);
-    let (place, normal) = minimise(start, reprojection, |place, step| place + step)?;
+    let sights: Vec<Sight> = observations.iter().map(|view| Sight::new(view, &world_from_first)).collect();
+    let (place, normal) =
+        minimise(linear(&sights)?, |place| reprojection(&sights, place), |p, step| p + step)?;
 
     let depth = 1.0 / place.z;
     if !(depth > NEAREST_Z && depth.is_finite()) {
@@ -59,19 +59,35 @@ pub fn triangulate_point(observations: &[PointView]) -> Option<Triangulation> {
     if !observations.iter().all(|view| (view.1 * point).z > NEAREST_Z) {
         return None;
     }
-    let ray = |view: &PointView| point - view.1.inverse() * Point3::origin();
+    let rays: Vec<Vector3<f64>> =
+        observations.iter().map(|view| point - view.1.inverse() * Point3::origin()).collect();
     let count = observations.len();
-    let parallax = widest_angle(&observations.iter(), |a, b| angle(&ray(a), &ray(b)));
+    let parallax = widest_angle(&rays.iter(), angle);
     let rms_px = (normal.cost / count as f64).sqrt();
     (parallax >= LEAST_PARALLAX).then_some(Triangulation { point, rms_px, parallax, count })
 }
 
-/// `(a, b, ρ)` with the least algebraic error: `(r₁ − x r₃) · (a, b, 1) + ρ (t₁ − x t₃) = 0`, and the same for y.
-fn linear(observations: &[PointView], world_from_first: &Pose) -> Option<Vector3<f64>> {
-    let mut normal = Normal::<3>::new();
-    for (camera, camera_from_world, pixel) in observations {
+/// An observation, in the space of the first camera.
+struct Sight {
+    camera: PinholeCamera,
+    /// Rotation and translation (metres) of `camera_from_first`.
+    rotation: Matrix3<f64>,
+    translation: Vector3<f64>,
+    pixel: Point2<f64>,
+}
+
+impl Sight {
+    fn new((camera, camera_from_world, pixel): &PointView, world_from_first: &Pose) -> Self {
         let camera_from_first = camera_from_world * world_from_first;
-        let (r, t) = (camera_from_first.rotation_matrix(), camera_from_first.translation());
+        let (rotation, translation) = (camera_from_first.rotation_matrix(), camera_from_first.translation());
+        Self { camera: *camera, rotation, translation, pixel: *pixel }
+    }
+}
+
+/// `(a, b, ρ)` with the least algebraic error: `(r₁ − x r₃) · (a, b, 1) + ρ (t₁ − x t₃) = 0`, and the same for y.
+fn linear(sights: &[Sight]) -> Option<Vector3<f64>> {
+    let mut normal = Normal::<3>::new();
+    for Sight { camera, rotation: r, translation: t, pixel } in sights {
         let seen = camera.normalised(*pixel);
         for (axis, focal) in [(0, camera.fx), (1, camera.fy)] {
             let row = r.row(axis) - r.row(2) * seen[axis];
@@ -83,15 +99,9 @@ fn linear(observations: &[PointView], world_from_first: &Pose) -> Option<Vector3
 }
 
 /// Normal equations of all reprojection errors at `(a, b, ρ)`; `None` when the point is not in front of every camera.
-fn reprojection(
-    observations: &[PointView],
-    world_from_first: &Pose,
-    place: &Vector3<f64>,
-) -> Option<Normal<3>> {
+fn reprojection(sights: &[Sight], place: &Vector3<f64>) -> Option<Normal<3>> {
     let mut normal = Normal::new();
-    for (camera, camera_from_world, pixel) in observations {
-        let camera_from_first = camera_from_world * world_from_first;
-        let (r, t) = (camera_from_first.rotation_matrix(), camera_from_first.translation());
+    for Sight { camera, rotation: r, translation: t, pixel } in sights {
         let seen = r * Vector3::new(place.x, place.y, 1.0) + t * place.z;
         if seen.z.is_nan() || seen.z <= 1e-12 {
             return None;
@@ -166,7 +176,8 @@ mod tests {
             let world_from_first = cameras[0].1.inverse();
             let p = cameras[0].1 * (point + Vector3::new(0.1, -0.1, 0.1));
             let place = Vector3::new(p.x / p.z, p.y / p.z, 1.0 / p.z);
-            let normal = |place: &Vector3<f64>| reprojection(&observations, &world_from_first, place);
+            let sights: Vec<Sight> = observations.iter().map(|view| Sight::new(view, &world_from_first)).collect();
+            let normal = |place: &Vector3<f64>| reprojection(&sights, place);
             // Central differences of a cost of about 1e3 px² with 1e-6: rounding 1e-7 of a gradient of about 1e5.
             prop_assert!(gradient_error(&place, normal, |place, step| place + step, 1e-6) < 1e-5);
         }

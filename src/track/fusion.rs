@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Matrix6, Point3, SMatrix, SVector, Vector3};
 
-use crate::geometry::{PinholeCamera, Pose, Residual};
+use crate::geometry::{PinholeCamera, Pose, Residual, product};
 
 /// A shift of a landmark, and its covariance after it.
 pub(super) struct Fused<const L: usize> {
@@ -22,17 +22,25 @@ pub(super) fn fuse<const M: usize, const L: usize>(
     prior: &SMatrix<f64, L, L>,
     pose: &Matrix6<f64>,
 ) -> Option<Fused<L>> {
-    let noise = residual.noise + residual.by_pose * pose * residual.by_pose.transpose();
-    let spread = prior * residual.by_landmark.transpose();
-    let innovation = noise + residual.by_landmark * spread;
-    let gain = spread * inverse(&innovation)?;
-    let shift = -gain * residual.error;
-    let rest = SMatrix::<f64, L, L>::identity() - gain * residual.by_landmark;
+    let noise = residual.noise + congruent(&residual.by_pose, pose);
+    let spread = product(prior, &residual.by_landmark.transpose());
+    let innovation = noise + product(&residual.by_landmark, &spread);
+    let gain = product(&spread, &inverse(&innovation)?);
+    let shift = product(&-gain, &residual.error);
+    let rest = SMatrix::<f64, L, L>::identity() - product(&gain, &residual.by_landmark);
     // Joseph's form, which stays symmetric and positive.
-    let covariance = rest * prior * rest.transpose() + gain * noise * gain.transpose();
+    let covariance = congruent(&rest, prior) + congruent(&gain, &noise);
     let covariance = (covariance + covariance.transpose()) * 0.5;
     (shift.iter().chain(covariance.iter()).all(|number| number.is_finite()))
         .then_some(Fused { shift, covariance })
+}
+
+/// `J Σ Jᵀ`: a covariance as it is seen through a derivative.
+pub(super) fn congruent<const M: usize, const N: usize>(
+    derivative: &SMatrix<f64, M, N>,
+    covariance: &SMatrix<f64, N, N>,
+) -> SMatrix<f64, M, M> {
+    product(&product(derivative, covariance), &derivative.transpose())
 }
 
 /// The inverse of a positive definite matrix.

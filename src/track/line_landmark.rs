@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3x2, Matrix4, Matrix6, Point2, Point3, Vector3};
 
-use super::fusion::{back_projected, fuse, inverse};
+use super::fusion::{back_projected, congruent, fuse, inverse};
 use super::point_landmark::{View, most_doubt};
 use super::sighting::LineSighting;
 use crate::geometry::{LineMatch, LineView, Pose, Segment, triangulate_line};
@@ -231,7 +231,7 @@ impl PendingLine {
                 depths: sighting.depths,
             };
             let residual = at.residual(&view.camera, &view.camera_from_world, view.sigma_px)?;
-            let noise = residual.noise + residual.by_pose * view.covariance * residual.by_pose.transpose();
+            let noise = residual.noise + congruent(&residual.by_pose, &view.covariance);
             let weight = inverse(&noise)?;
             information += residual.by_landmark.transpose() * weight * residual.by_landmark;
             cost += residual.error.dot(&(weight * residual.error));

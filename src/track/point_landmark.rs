@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Matrix6, Point2, Point3};
 
-use super::fusion::{back_projected, fuse, inverse};
+use super::fusion::{back_projected, congruent, fuse, inverse};
 use super::sighting::PointSighting;
 use crate::geometry::{PinholeCamera, PointMatch, PointView, Pose, triangulate_point};
 
@@ -144,7 +144,7 @@ impl PendingPoint {
             let at =
                 PointMatch { point: found.point, covariance: Matrix3::zeros(), pixel: *pixel, depth: None };
             let residual = at.residual(&view.camera, &view.camera_from_world, view.sigma_px)?;
-            let noise = residual.noise + residual.by_pose * view.covariance * residual.by_pose.transpose();
+            let noise = residual.noise + congruent(&residual.by_pose, &view.covariance);
             let weight = inverse(&noise)?;
             information += residual.by_landmark.transpose() * weight * residual.by_landmark;
             cost += residual.error.dot(&(weight * residual.error));

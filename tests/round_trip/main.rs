@@ -110,6 +110,21 @@ fn files(path: &Path) -> Vec<(String, Vec<u8>)> {
     files
 }
 
+#[test]
+fn a_table_of_several_row_groups_comes_back_in_order_on_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("sequence");
+    let rows = 2 * (1 << 18) + 5;
+    let row = |id| PointLandmark { point_id: PointId(id), x: id as f64, ..Default::default() };
+    let sequence = Sequence { point_landmarks: (0..rows).map(row).collect(), ..Sequence::default() };
+    format::write(&path, &sequence, WriteOptions::default()).unwrap();
+    for threads in [1, 2, 5] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let read = pool.install(|| format::open(&path).unwrap().table::<PointLandmark>().unwrap());
+        assert!(read == sequence.point_landmarks, "{threads} threads");
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 16, ..ProptestConfig::default() })]
 

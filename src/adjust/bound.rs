@@ -57,7 +57,9 @@ pub fn bound(graph: &FactorGraph, options: &Options, alignment: Alignment) -> Re
     let options = Options { loss: Loss::None, ..options.clone() };
     options.check()?;
     let mut summary = Summary::default();
-    let observations = Observations::of(graph, &options, &mut summary)?;
+    let mut observations = Observations::of(graph, &options, &mut summary)?;
+    // The alignment below is one of space.
+    observations.planar = false;
     let mut grouping = Grouping::none(&observations);
     if options.method == Method::Structural && options.parallelism != Parallelism::Ignored {
         grouping = Grouping::given(graph, &observations, &mut summary);

@@ -3,6 +3,7 @@
 use super::error::Error;
 use super::estimation::{Estimation, LineHandle};
 use super::observations::Observations;
+use super::planar_pose::PLANE;
 use super::point_handle::PointHandle;
 use super::pose_factor::adjoint;
 use super::problem::Variable;
@@ -30,7 +31,7 @@ impl Estimation {
         let uncertainty = Uncertainty::of(&self.problem)?;
         let blocks = uncertainty.blocks(&self.problem, &self.poses);
         let poses = observations.frames.iter().zip(&blocks).map(|(frame, block)| {
-            let block: SMatrix<f64, 6, 6> = block.fixed_view::<6, 6>(0, 0).into_owned();
+            let block = in_space(block);
             // (Exp(δ) T)⁻¹ = Exp(−Ad(T⁻¹) δ) T⁻¹
             let turn = adjoint(&frame.camera_from_world.inverse());
             triangle(&(turn * block * turn.transpose()))
@@ -121,6 +122,21 @@ impl Estimation {
         }
         functional
     }
+}
+
+/// The covariance of a pose's tangent; of one in the plane, what leaves it is known.
+fn in_space(block: &DMatrix<f64>) -> SMatrix<f64, 6, 6> {
+    let mut all = SMatrix::<f64, 6, 6>::zeros();
+    if block.nrows() == PLANE.len() {
+        for (row, place) in PLANE.into_iter().enumerate() {
+            for (column, other) in PLANE.into_iter().enumerate() {
+                all[(place, other)] = block[(row, column)];
+            }
+        }
+    } else {
+        all.copy_from(&block.fixed_view::<6, 6>(0, 0));
+    }
+    all
 }
 
 /// The upper triangle of a symmetric matrix, row by row.

@@ -9,17 +9,19 @@ use super::loss::Loss;
 use super::minimise::Step;
 use super::observations::Observations;
 use super::options::{LineKind, Method, Options, Parallelism};
-use super::parametrisation::{DirectionSpace, LineSpace, PoseSpace, VectorSpace};
+use super::parametrisation::{DirectionSpace, LineSpace, Parametrisation, PoseSpace, VectorSpace};
+use super::planar_pose::{PLANE, PlanarPoseFactor, PlanarPoseSpace};
 use super::point_handle::PointHandle;
-use super::pose_factor::{PosePriorFactor, RelativePoseFactor, ScaleFactor};
+use super::pose_factor::{PosePriorFactor, ScaleFactor};
 use super::problem::{Problem, Variable};
+use super::relative_pose_factor::RelativePoseFactor;
 use super::scale_gauge::ONE_PLACE_M;
 use super::shared_line::{ParallelFactor, RightAngleFactor, SharedLineFactor, shared_plucker};
 use super::summary::Summary;
 use super::whitening::{ends_depth_sight, ends_sight, root};
 use crate::geometry::{PluckerLine, Segment};
 use crate::structure::{Estimate, Iteration, MapLine, MapPoint, PoseRow, TrajectoryPose};
-use nalgebra::{Matrix3x4, Matrix6, Point2, Point3, SMatrix, Vector3, Vector6};
+use nalgebra::{DMatrix, Matrix3, Matrix3x4, Matrix6, Point2, Point3, SMatrix, Vector3, Vector6};
 use std::marker::PhantomData;
 use std::sync::Arc;
 
@@ -64,12 +66,11 @@ impl Estimation {
         summary: &mut Summary,
     ) -> Result<Self, Error> {
         let mut problem = Problem::new();
-        let pose_space = Arc::new(PoseSpace);
-        let poses: Vec<Variable> = observations
-            .frames
-            .iter()
-            .map(|frame| problem.add(&pose_space, &PoseSpace::numbers_of(&frame.camera_from_world)))
-            .collect();
+        let poses = if observations.planar {
+            add_poses(&mut problem, PlanarPoseSpace, observations)
+        } else {
+            add_poses(&mut problem, PoseSpace, observations)
+        };
         let mut estimation =
             Self { problem, poses, points: Vec::new(), lines: Vec::new(), line_kind: options.lines };
         estimation.add_points(observations, options)?;
@@ -173,19 +174,28 @@ impl Estimation {
     }
 
     fn add_relatives(&mut self, observations: &Observations, options: &Options) -> Result<(), Error> {
-        let factors = observations.relatives.iter().map(|view| {
-            let root = view.information.as_ref().map_or_else(Matrix6::identity, |information| {
-                let root = root(information);
-                root.map_or_else(Matrix6::zeros, |root| root.fixed_view::<6, 6>(0, 0).into_owned())
-            });
-            RelativePoseFactor {
-                variables: [self.poses[view.frame], self.poses[view.other]],
-                other_from_frame: view.frame_from_other.inverse(),
-                root,
+        let (mut planar, mut spatial) = (Vec::new(), Vec::new());
+        for view in &observations.relatives {
+            let variables = [self.poses[view.frame], self.poses[view.other]];
+            if observations.planar {
+                let information = view.information.as_ref();
+                let information = information.map_or_else(
+                    || DMatrix::identity(3, 3),
+                    |all| DMatrix::from_fn(3, 3, |row, column| all[(PLANE[row], PLANE[column])]),
+                );
+                let root = root(&information)
+                    .map_or_else(Matrix3::zeros, |root| root.fixed_view::<3, 3>(0, 0).into_owned());
+                planar.push(PlanarPoseFactor::new(variables, &view.frame_from_other, &root));
+            } else {
+                let root = view.information.as_ref().map_or_else(Matrix6::identity, |information| {
+                    let root = root(information);
+                    root.map_or_else(Matrix6::zeros, |root| root.fixed_view::<6, 6>(0, 0).into_owned())
+                });
+                spatial.push(RelativePoseFactor::new(variables, &view.frame_from_other, &root));
             }
-        });
-        let factors = factors.collect();
-        self.problem.add_factors(factors, options.loss)
+        }
+        self.problem.add_factors(planar, options.loss)?;
+        self.problem.add_factors(spatial, options.loss)
     }
 
     fn add_priors(&mut self, observations: &Observations, options: &Options) -> Result<(), Error> {
@@ -370,7 +380,7 @@ impl Estimation {
         summary: &mut Summary,
     ) -> Result<Estimate, Error> {
         let name = options.estimate_name().to_owned();
-        summary.residual_rms = self.residual_rms();
+        summary.residual_rms = residual_rms(&self.problem);
         let mut covariances = if options.covariance {
             self.hold_scale(observations)?;
             // The estimate is worth keeping also where something is left open.
@@ -419,19 +429,30 @@ impl Estimation {
             iterations: iterations.collect(),
         })
     }
+}
 
-    /// Root mean square of all whitened residuals, before the loss.
-    fn residual_rms(&self) -> f64 {
-        let values = self.problem.values();
-        let (mut sum, mut count) = (0.0, 0);
-        for batch in &self.problem.batches {
-            for factor in 0..batch.len() {
-                sum += batch.squared(factor, &values).unwrap_or_default();
-                count += batch.residuals();
-            }
+/// Root mean square of all whitened residuals of a problem, before the loss.
+pub(super) fn residual_rms(problem: &Problem) -> f64 {
+    let values = problem.values();
+    let (mut sum, mut count) = (0.0, 0);
+    for batch in &problem.batches {
+        for factor in 0..batch.len() {
+            sum += batch.squared(factor, &values).unwrap_or_default();
+            count += batch.residuals();
         }
-        if count == 0 { 0.0 } else { (sum / count as f64).sqrt() }
     }
+    if count == 0 { 0.0 } else { (sum / count as f64).sqrt() }
+}
+
+/// Adds the poses of all frames, in one space.
+fn add_poses<P: Parametrisation + 'static>(
+    problem: &mut Problem,
+    space: P,
+    observations: &Observations,
+) -> Vec<Variable> {
+    let space = Arc::new(space);
+    let frames = observations.frames.iter();
+    frames.map(|frame| problem.add(&space, &PoseSpace::numbers_of(&frame.camera_from_world))).collect()
 }
 
 /// `W` of a pose with the same uncertainty in all axes.

@@ -1,6 +1,9 @@
 //! A factor graph into an estimate: bundle adjustment, structural adjustment and pose graphs.
 
 mod adjustment;
+mod bal_camera;
+mod bal_factor;
+mod bal_problem;
 mod block_pattern;
 mod bound;
 mod covariances;
@@ -23,12 +26,14 @@ mod panels;
 mod parallax_point;
 mod parametrisation;
 mod plan;
+mod planar_pose;
 mod point_factor;
 mod point_handle;
 mod point_sight;
 mod pose_factor;
 mod problem;
 mod reduced_system;
+mod relative_pose_factor;
 mod scale_gauge;
 mod shared_line;
 mod summary;
@@ -36,6 +41,8 @@ mod uncertainty;
 mod whitening;
 
 pub use adjustment::{Adjusted, adjust, adjust_watched};
+pub use bal_camera::BalCameraSpace;
+pub use bal_problem::{BalAdjusted, BalBundle, BalView, adjust_bal};
 pub use bound::{Alignment, Bound, bound};
 pub use error::Error;
 pub use factor::{Factor, MOST_RESIDUALS};
@@ -46,6 +53,7 @@ pub use parametrisation::{
     DirectionSpace, LineSpace, MOST_FREEDOM, Parametrisation, PoseSpace, RotationSpace, VectorSpace,
 };
 pub use plan::{Choice, Eliminate, Factorisation, Plan};
+pub use planar_pose::PlanarPoseSpace;
 pub use problem::{Problem, Values, Variable};
 pub use summary::{Reason, ReleasedLine, Summary, Tally};
 

@@ -116,6 +116,9 @@ impl NormalEquations {
                     3 => sum_diagonal::<3>(incidences, residuals, jacobians, gradient, block),
                     2 => sum_diagonal::<2>(incidences, residuals, jacobians, gradient, block),
                     5 => sum_diagonal::<5>(incidences, residuals, jacobians, gradient, block),
+                    9 => sum_diagonal::<9>(incidences, residuals, jacobians, gradient, block),
+                    8 => sum_diagonal::<8>(incidences, residuals, jacobians, gradient, block),
+                    7 => sum_diagonal::<7>(incidences, residuals, jacobians, gradient, block),
                     _ => sum_diagonal::<1>(incidences, residuals, jacobians, gradient, block),
                 }
             }
@@ -138,6 +141,7 @@ impl NormalEquations {
                         (6, 3) => add_product::<6, 3>(pair, jacobians, tie),
                         (4, 6) => add_product::<4, 6>(pair, jacobians, tie),
                         (6, 4) => add_product::<6, 4>(pair, jacobians, tie),
+                        (3, 9) => add_product::<3, 9>(pair, jacobians, tie),
                         _ => add_any_product(pair, jacobians, size, other, tie),
                     }
                 }
@@ -199,6 +203,9 @@ impl NormalEquations {
                         3 => invert::<3>(block, diagonal, damping, inverse),
                         2 => invert::<2>(block, diagonal, damping, inverse),
                         5 => invert::<5>(block, diagonal, damping, inverse),
+                        9 => invert::<9>(block, diagonal, damping, inverse),
+                        8 => invert::<8>(block, diagonal, damping, inverse),
+                        7 => invert::<7>(block, diagonal, damping, inverse),
                         _ => invert::<1>(block, diagonal, damping, inverse),
                     };
                     if !positive {
@@ -211,6 +218,7 @@ impl NormalEquations {
                         match (size, columns) {
                             (3, 6) => multiply_fixed::<3, 6>(inverse, &ties[numbers], solved),
                             (6, 3) => multiply_fixed::<6, 3>(inverse, &ties[numbers], solved),
+                            (3, 9) => multiply_fixed::<3, 9>(inverse, &ties[numbers], solved),
                             _ => multiply(inverse, &ties[numbers], size, columns, solved),
                         }
                     }
@@ -272,6 +280,9 @@ impl NormalEquations {
                         }
                         (6, 3, 3) => {
                             subtract::<6, 3, 3>(tie, solved, values, row == column, |c| places.at(row, c));
+                        }
+                        (3, 9, 9) => {
+                            subtract::<3, 9, 9>(tie, solved, values, row == column, |c| places.at(row, c));
                         }
                         (2, 6, 6) => {
                             subtract::<2, 6, 6>(tie, solved, values, row == column, |c| places.at(row, c));

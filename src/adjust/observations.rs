@@ -2,6 +2,7 @@
 
 use super::error::Error;
 use super::options::{Method, Options};
+use super::planar_pose::{PLANE, is_planar};
 use super::summary::{Reason, Summary, Tally};
 use super::whitening::root as information_root;
 use crate::geometry::{PinholeCamera, PluckerLine, Pose, Segment, line_residual};
@@ -67,6 +68,20 @@ pub(super) struct RelativeView {
     pub(super) information: Option<DMatrix<f64>>,
 }
 
+impl RelativeView {
+    /// Whether it keeps the plane and says nothing of what leaves it.
+    fn is_planar(&self) -> bool {
+        let is_outside = |row: usize| !PLANE.contains(&row);
+        is_planar(&self.frame_from_other)
+            && self.information.as_ref().is_some_and(|information| {
+                let mut places = (0..6).flat_map(|row| (0..6).map(move |column| (row, column)));
+                places.all(|(row, column)| {
+                    information[(row, column)] == 0.0 || !(is_outside(row) || is_outside(column))
+                })
+            })
+    }
+}
+
 /// What can be used of a graph.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Observations {
@@ -76,6 +91,8 @@ pub(super) struct Observations {
     pub(super) point_views: Vec<PointView>,
     pub(super) line_views: Vec<LineView>,
     pub(super) relatives: Vec<RelativeView>,
+    /// Whether poses and relative poses keep the plane z = 0 and nothing is said of what leaves it; they are then adjusted in it.
+    pub(super) planar: bool,
     pub(super) noise: MeasurementNoise,
 }
 
@@ -120,6 +137,10 @@ impl Observations {
         }
         found.drop_rare(options.min_views, summary);
         found.count(summary);
+        found.planar = options.method == Method::PoseGraph
+            && options.priors.is_empty()
+            && found.frames.iter().all(|frame| is_planar(&frame.camera_from_world))
+            && found.relatives.iter().all(RelativeView::is_planar);
         let nothing = |expected| Error::Nothing { graph: graph.name.clone(), expected };
         if found.frames.is_empty() {
             return Err(nothing("poses"));
@@ -330,7 +351,7 @@ impl Observations {
 }
 
 /// The first member of a set of joined places; shortens the way there.
-fn root(parent: &mut [usize], mut at: usize) -> usize {
+pub(super) fn root(parent: &mut [usize], mut at: usize) -> usize {
     while parent[at] != at {
         parent[at] = parent[parent[at]];
         at = parent[at];

@@ -4,11 +4,11 @@ use crate::geometry::{OrthonormalLine, Pose};
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3, Vector6};
 
 /// Most degrees of freedom of one variable.
-pub const MOST_FREEDOM: usize = 6;
+pub const MOST_FREEDOM: usize = 9;
 
 /// A space in which variables of one kind live: numbers, degrees of freedom, and what a step does.
 ///
-/// The library's own are [`PoseSpace`], [`VectorSpace`], [`LineSpace`], [`DirectionSpace`] and [`RotationSpace`]; a user's own is used in
+/// The library's own are [`PoseSpace`], [`PlanarPoseSpace`](super::PlanarPoseSpace), [`VectorSpace`], [`LineSpace`], [`DirectionSpace`] and [`RotationSpace`]; a user's own is used in
 /// the same way:
 ///
 /// ```
@@ -89,9 +89,13 @@ impl PoseSpace {
     /// The pose of the numbers.
     #[must_use]
     pub fn pose_of(numbers: &[f64]) -> Pose {
-        let quaternion = Quaternion::new(numbers[6], numbers[3], numbers[4], numbers[5]);
-        Pose::new(UnitQuaternion::new_normalize(quaternion), translation(numbers))
+        Pose::new(UnitQuaternion::new_normalize(quaternion(numbers)), translation(numbers))
     }
+}
+
+/// The quaternion of a pose's numbers.
+pub(super) fn quaternion(numbers: &[f64]) -> Quaternion<f64> {
+    Quaternion::new(numbers[6], numbers[3], numbers[4], numbers[5])
 }
 
 /// The translation of a pose's numbers.

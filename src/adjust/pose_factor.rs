@@ -1,48 +1,10 @@
-//! Residuals of poses alone: relative poses and priors.
+//! Residuals of single poses: priors, and the scale that pixels leave open.
 
 use super::factor::Factor;
 use super::parametrisation::{PoseSpace, rotation, translation};
 use super::problem::{Values, Variable};
 use crate::geometry::Pose;
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
-
-/// A frame as seen from another: `ξ` of `Exp(ξ) · measured = frame_from_world · world_from_other`.
-pub(super) struct RelativePoseFactor {
-    /// The frame and the other frame.
-    pub(super) variables: [Variable; 2],
-    pub(super) other_from_frame: Pose,
-    /// `W`: `WᵀW` is the information over `ξ`.
-    pub(super) root: Matrix6<f64>,
-}
-
-impl Factor for RelativePoseFactor {
-    const RESIDUALS: usize = 6;
-    type Variables = [Variable; 2];
-
-    fn variables(&self) -> [Variable; 2] {
-        self.variables
-    }
-
-    fn evaluate(&self, values: &Values<'_>, residual: &mut [f64], jacobian: Option<&mut [f64]>) -> bool {
-        let frame = PoseSpace::pose_of(values.of(self.variables[0]));
-        let other = PoseSpace::pose_of(values.of(self.variables[1]));
-        let predicted = frame * other.inverse();
-        let error = (predicted * self.other_from_frame).log();
-        residual.copy_from_slice((self.root * error).as_slice());
-        if let Some(jacobian) = jacobian {
-            // Exp(δ₁) E, and E' = frame Exp(−δ₂) other⁻¹ measured⁻¹ = Exp(−Ad(predicted) δ₂) E.
-            let by_frame = self.root * inverse_left_jacobian(&error);
-            let by_other = -by_frame * adjoint(&predicted);
-            for row in 0..6 {
-                for column in 0..6 {
-                    jacobian[row * 12 + column] = by_frame[(row, column)];
-                    jacobian[row * 12 + 6 + column] = by_other[(row, column)];
-                }
-            }
-        }
-        residual.iter().all(|number| number.is_finite())
-    }
-}
 
 /// A pose that is known beforehand: `ξ` of `Exp(ξ) · known = camera_from_world`.
 pub(super) struct PosePriorFactor {

@@ -41,6 +41,19 @@ pub struct BalProblem {
 }
 
 impl BalCamera {
+    /// Its numbers in the order of a file: rotation vector, translation, focal length, k1, k2.
+    #[must_use]
+    pub fn numbers(&self) -> [f64; 9] {
+        let ([a, b, c], [x, y, z], [k1, k2]) = (self.rotation, self.translation, self.radial);
+        [a, b, c, x, y, z, self.focal, k1, k2]
+    }
+
+    /// A camera from its numbers in the order of a file.
+    #[must_use]
+    pub fn from_numbers([a, b, c, x, y, z, focal, k1, k2]: [f64; 9]) -> Self {
+        Self { rotation: [a, b, c], translation: [x, y, z], focal, radial: [k1, k2] }
+    }
+
     /// `x ↦ R x + t`: the pose of the world in the camera, whose z points backwards and y up.
     #[must_use]
     pub fn camera_from_world(&self) -> Pose {

@@ -73,9 +73,7 @@ pub fn read_bal(input: impl BufRead) -> Result<BalProblem, Error> {
         problem.observations.push(BalObservation { camera, point, pixel: words.numbers("a pixel")? });
     }
     for _ in 0..cameras {
-        let [a, b, c, x, y, z, focal, k1, k2] = words.numbers("a camera")?;
-        let (rotation, translation) = ([a, b, c], [x, y, z]);
-        problem.cameras.push(BalCamera { rotation, translation, focal, radial: [k1, k2] });
+        problem.cameras.push(BalCamera::from_numbers(words.numbers("a camera")?));
     }
     for _ in 0..points {
         problem.points.push(words.numbers("a point")?);
@@ -97,8 +95,7 @@ pub fn write_bal(output: &mut dyn Write, problem: &BalProblem) -> Result<(), Err
         writeln!(output, "{camera} {point} {u:?} {v:?}")?;
     }
     for camera in cameras {
-        let rest = [camera.focal, camera.radial[0], camera.radial[1]];
-        for number in camera.rotation.iter().chain(&camera.translation).chain(&rest) {
+        for number in camera.numbers() {
             writeln!(output, "{number:?}")?;
         }
     }

@@ -16,11 +16,11 @@ FUZZ_ARGS ?=
 # Tests, benchmarks and examples stop at what they did not expect, and need not be pretty.
 TESTS_MAY := $(addprefix --allow clippy::,pedantic unwrap_used expect_used print_stdout print_stderr)
 
-.PHONY: help setup demo test lint bench paper-table fuzz conformance-corpus spec
+.PHONY: help setup demo test lint bench bench-peers paper-table fuzz conformance-corpus spec
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
-	@echo 'make bench | paper-table | fuzz | conformance-corpus | spec | setup'
+	@echo 'make bench | bench-peers | paper-table | fuzz | conformance-corpus | spec | setup'
 
 setup: ## what the other targets need
 	@.ci/setup
@@ -40,6 +40,10 @@ lint:
 
 bench:
 	cargo bench --workspace --locked
+
+# Ours and its peers (Ceres, GTSAM, apex-solver) on the same graphs; an hour and more. ARGS: see benches/peers/run --help
+bench-peers:
+	@benches/peers/run $(ARGS)
 
 # The paper's table on the sequences of the first release; an hour and more, and it goes on where it was cut off.
 paper-table:

@@ -1,6 +1,6 @@
 """GTSAM on the graphs of `make bench-peers`; says cost over time as one line of JSON.
 
-    adjust.py graph|bal|pose-graph PATH [--threads N] [--iterations N] [--seconds S] [--target COST]
+    adjust.py graph|bal|pose-graph PATH [--ordering O] [--threads N] [--iterations N] [--seconds S] [--target COST]
 
 Points and poses only: GTSAM has no factor of lines. Its optimisers are stepped from here, one iteration at a time; between
 two of them nothing but the clock and the cost is read. The wheel's own number of threads is used; `--threads` is only told.
@@ -20,6 +20,17 @@ from gtsam.symbol_shorthand import L, P, X
 
 class Unsupported(Exception):
     """What GTSAM has nothing for."""
+
+
+def hold(factors, key, pose):
+    """Holds a pose: by a prior so tight that it stays, for a constraint proper makes GTSAM take QR for Cholesky.
+
+    The rest can follow it rigidly, so that the prior costs nothing where the cost is least.
+    """
+    if isinstance(pose, gtsam.Pose3):
+        factors.add(gtsam.PriorFactorPose3(key, pose, gtsam.noiseModel.Isotropic.Sigma(6, 1e-4)))
+    else:
+        factors.add(gtsam.PriorFactorPose2(key, pose, gtsam.noiseModel.Isotropic.Sigma(3, 1e-4)))
 
 
 def read_graph(path):
@@ -45,7 +56,7 @@ def read_graph(path):
                 pose = gtsam.Pose3(gtsam.Rot3.Quaternion(qw, qx, qy, qz), numpy.array([tx, ty, tz]))
                 values.insert(X(len(poses)), pose)
                 if words[1] == "held":
-                    factors.add(gtsam.NonlinearEqualityPose3(X(len(poses)), pose))
+                    hold(factors, X(len(poses)), pose)
                 poses.append(pose)
                 camera_of.append(int(words[0]))
             elif kind == "prior":
@@ -70,18 +81,27 @@ def read_graph(path):
 
 
 def read_bal(path):
-    """Factors and initial values of a problem of Bundle Adjustment in the Large, by GTSAM's own reader."""
-    data = gtsam.SfmData.FromBalFile(path)
+    """Factors and initial values of a problem of Bundle Adjustment in the Large; GTSAM's own reader takes pixels as floats."""
+    with open(path, encoding="utf-8") as file:
+        words = iter(file.read().split())
+    cameras, points, views = (int(next(words)) for _ in range(3))
     factors, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
     noise = gtsam.noiseModel.Unit.Create(2)
-    for place in range(data.numberCameras()):
-        values.insert(X(place), data.camera(place))
-    for place in range(data.numberTracks()):
-        track = data.track(place)
-        values.insert(P(place), track.point3())
-        for view in range(track.numberMeasurements()):
-            camera, pixel = track.measurement(view)
-            factors.add(gtsam.GeneralSFMFactorCal3Bundler(pixel, noise, X(camera), P(place)))
+    for _ in range(views):
+        camera, point, u, v = int(next(words)), int(next(words)), float(next(words)), float(next(words))
+        # Its y goes down, theirs up.
+        factors.add(gtsam.GeneralSFMFactorCal3Bundler(numpy.array([u, -v]), noise, X(camera), P(point)))
+    for place in range(cameras):
+        turn, shift, lens = (numpy.array([float(next(words)) for _ in range(3)]) for _ in range(3))
+        angle = numpy.linalg.norm(turn)
+        rotation = gtsam.Rot3.AxisAngle(turn / angle, angle) if angle > 0.0 else gtsam.Rot3()
+        # Its camera looks along −z with y up, theirs along z with y down.
+        flipped = gtsam.Rot3(numpy.diag([1.0, -1.0, -1.0]))
+        inverse = rotation.inverse()
+        pose = gtsam.Pose3(inverse.compose(flipped), inverse.rotate(-shift))
+        values.insert(X(place), gtsam.PinholeCameraCal3Bundler(pose, gtsam.Cal3Bundler(*lens, 0.0, 0.0)))
+    for place in range(points):
+        values.insert(P(place), numpy.array([float(next(words)) for _ in range(3)]))
     return factors, values
 
 
@@ -91,11 +111,16 @@ def read_pose_graph(path):
         is_3d = "SE3" in file.readline()
     factors, values = gtsam.readG2o(path, is_3d)
     first = min(values.keys())
-    if is_3d:
-        factors.add(gtsam.NonlinearEqualityPose3(first, values.atPose3(first)))
-    else:
-        factors.add(gtsam.NonlinearEqualityPose2(first, values.atPose2(first)))
+    hold(factors, first, values.atPose3(first) if is_3d else values.atPose2(first))
     return factors, values
+
+
+def poses_first(values):
+    """The order in which poses are eliminated before points."""
+    ordering = gtsam.Ordering()
+    for key in sorted(values.keys(), key=lambda key: (gtsam.Symbol(key).chr() != ord("x"), key)):
+        ordering.push_back(key)
+    return ordering
 
 
 READERS = {"graph": read_graph, "bal": read_bal, "pose-graph": read_pose_graph}
@@ -105,6 +130,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("kind", choices=READERS)
     parser.add_argument("path")
+    parser.add_argument("--ordering", choices=["colamd", "metis", "poses-first"], default="colamd")
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--iterations", type=int, default=100)
     parser.add_argument("--seconds", type=float, default=math.inf)
@@ -119,6 +145,10 @@ def main():
     start = time.perf_counter()
     # As Ceres steps: damping by the diagonal, gain ratios decide.
     parameters = gtsam.LevenbergMarquardtParams.CeresDefaults()
+    if arguments.ordering == "poses-first":
+        parameters.setOrdering(poses_first(values))
+    else:
+        parameters.setOrderingType(arguments.ordering.upper())
     optimiser = gtsam.LevenbergMarquardtOptimizer(factors, values, parameters)
     cost = optimiser.error()
     initial, ending = cost, "iterations"

@@ -8,7 +8,7 @@ use apex_solver::{Factor, JacobianMode, ManifoldType, NoiseModel};
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Quaternion, UnitQuaternion, Vector2, Vector3};
 use std::collections::BTreeMap;
 
-/// `[ Rₐᵀ (p_b − pₐ) − t ; 2 vec(q q_b⁻¹ qₐ) ]` with the measured pose (q, t) of b in a.
+/// `[t; 2 vec q]` of `Z⁻¹ Xₐ⁻¹ X_b`, with the measured pose Z of b in a.
 struct RelativePoseFactor {
     q: UnitQuaternion<f64>,
     t: Vector3<f64>,
@@ -17,27 +17,26 @@ struct RelativePoseFactor {
 impl Factor for RelativePoseFactor {
     fn linearize(&self, params: &[&[f64]], residual: &mut [f64], jacobian: Option<faer::MatMut<'_, f64>>) {
         let (qa, qb) = (rotation(params[0]), rotation(params[1]));
-        let seen = qa.inverse() * (vector(params[1]) - vector(params[0]));
-        let error: Quaternion<f64> = (self.q * qb.inverse() * qa).into_inner();
+        let (seen, a_from_b) = (qa.inverse() * (vector(params[1]) - vector(params[0])), qa.inverse() * qb);
+        let error: Quaternion<f64> = (self.q.inverse() * a_from_b).into_inner();
         let v = error.imag();
-        residual[..3].copy_from_slice((seen - self.t).as_slice());
+        residual[..3].copy_from_slice((self.q.inverse() * (seen - self.t)).as_slice());
         residual[3..].copy_from_slice((v * 2.0).as_slice());
         if let Some(mut jacobian) = jacobian {
-            // Steps on the right: e Exp(θ) moves 2 vec(e) by (w I + [v]ₓ) θ, and one of b comes with −Rₐᵀ R_b.
-            let by_a = Matrix3::identity() * error.w + v.cross_matrix();
-            let a_from_b = (qa.inverse() * qb).to_rotation_matrix().into_inner();
-            let by_b = -by_a * a_from_b;
-            let turned = seen.cross_matrix();
+            jacobian.fill(0.0);
+            // Steps on the right: q Exp(θ) moves 2 vec q by (w I + [v]ₓ) θ, and one of a comes with −R_abᵀ.
+            let inverse = self.q.inverse().to_rotation_matrix().into_inner();
+            let a_from_b = a_from_b.to_rotation_matrix().into_inner();
+            let turn_b = Matrix3::identity() * error.w + v.cross_matrix();
+            let turn_a = -turn_b * a_from_b.transpose();
+            let (shift_b, shift_turn) = (inverse * a_from_b, inverse * seen.cross_matrix());
             for row in 0..3 {
                 for column in 0..3 {
-                    jacobian[(row, column)] = if row == column { -1.0 } else { 0.0 };
-                    jacobian[(row, 3 + column)] = turned[(row, column)];
-                    jacobian[(row, 6 + column)] = a_from_b[(row, column)];
-                    jacobian[(row, 9 + column)] = 0.0;
-                    jacobian[(3 + row, column)] = 0.0;
-                    jacobian[(3 + row, 3 + column)] = by_a[(row, column)];
-                    jacobian[(3 + row, 6 + column)] = 0.0;
-                    jacobian[(3 + row, 9 + column)] = by_b[(row, column)];
+                    jacobian[(row, column)] = -inverse[(row, column)];
+                    jacobian[(row, 3 + column)] = shift_turn[(row, column)];
+                    jacobian[(row, 6 + column)] = shift_b[(row, column)];
+                    jacobian[(3 + row, 3 + column)] = turn_a[(row, column)];
+                    jacobian[(3 + row, 9 + column)] = turn_b[(row, column)];
                 }
             }
         }
@@ -52,31 +51,37 @@ impl Factor for RelativePoseFactor {
     }
 }
 
-/// `[ Rₐᵀ (p_b − pₐ) − t ; θ_b − θₐ − θ ]`, the angle wrapped.
+/// `[x y θ]` of `Z⁻¹ Xₐ⁻¹ X_b`, the angle wrapped.
 struct PlanarPoseFactor {
     measured: [f64; 3],
+}
+
+/// The inverse of the rotation by an angle.
+fn inverse_rotation(angle: f64) -> Matrix2<f64> {
+    let (sine, cosine) = angle.sin_cos();
+    Matrix2::new(cosine, sine, -sine, cosine)
 }
 
 impl Factor for PlanarPoseFactor {
     fn linearize(&self, params: &[&[f64]], residual: &mut [f64], jacobian: Option<faer::MatMut<'_, f64>>) {
         let (a, b) = (params[0], params[1]);
-        let (sine, cosine) = a[2].sin_cos();
-        let inverse = Matrix2::new(cosine, sine, -sine, cosine);
-        let seen = inverse * Vector2::new(b[0] - a[0], b[1] - a[1]);
-        let turn = b[2] - a[2] - self.measured[2];
-        residual[0] = seen.x - self.measured[0];
-        residual[1] = seen.y - self.measured[1];
+        let [x, y, angle] = self.measured;
+        let (of_a, of_measured) = (inverse_rotation(a[2]), inverse_rotation(angle));
+        let seen = of_a * Vector2::new(b[0] - a[0], b[1] - a[1]);
+        let turn = b[2] - a[2] - angle;
+        residual[..2].copy_from_slice((of_measured * (seen - Vector2::new(x, y))).as_slice());
         residual[2] = turn - std::f64::consts::TAU * (turn / std::f64::consts::TAU).round();
         if let Some(mut jacobian) = jacobian {
             jacobian.fill(0.0);
+            let both = of_measured * of_a;
+            let by_turn = of_measured * Vector2::new(seen.y, -seen.x);
             for row in 0..2 {
                 for column in 0..2 {
-                    jacobian[(row, column)] = -inverse[(row, column)];
-                    jacobian[(row, 3 + column)] = inverse[(row, column)];
+                    jacobian[(row, column)] = -both[(row, column)];
+                    jacobian[(row, 3 + column)] = both[(row, column)];
                 }
+                jacobian[(row, 2)] = by_turn[row];
             }
-            jacobian[(0, 2)] = seen.y;
-            jacobian[(1, 2)] = -seen.x;
             jacobian[(2, 2)] = -1.0;
             jacobian[(2, 5)] = 1.0;
         }

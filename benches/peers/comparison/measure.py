@@ -41,7 +41,7 @@ class Compared:
 
     group: str
     name: str
-    target: float
+    target: float | None  # none where ours failed
     ours: Measured
     peers: dict
     disagreements: list
@@ -107,7 +107,8 @@ def compare(problem, own, peers, limits, say):
     """Explores, then times ours and every peer in turn."""
     first = own.run(problem.own_path, problem.method, limits)
     if isinstance(first, str):
-        raise RuntimeError(f"{problem.group}, {problem.name}: {first}")
+        where = f"{problem.group}, {problem.name}"
+        return Compared(problem.group, problem.name, None, Measured(note=first), {}, [f"{where}: ours failed: {first}"])
     say(f"    ours: {first.final_cost:.7e} in {first.seconds:.2f} s, {first.steps} steps")
     explored, patience = {}, limits
     for name, peer in peers.items():

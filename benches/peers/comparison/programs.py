@@ -91,7 +91,8 @@ def run_json(command, seconds):
     except subprocess.TimeoutExpired:
         return f"no end within {seconds:.0f} s"
     if done.returncode != 0 or not done.stdout.strip():
-        words = done.stderr.strip().splitlines()
+        # A panic ends with a note on backtraces.
+        words = [line for line in done.stderr.strip().splitlines() if not line.startswith("note:")]
         return words[-1] if words else f"ended with status {done.returncode}"
     return json.loads(done.stdout.strip().splitlines()[-1])
 

@@ -12,7 +12,7 @@ def number(value):
 
 def peer_cells(measured, missing, ours):
     """Seconds of a peer, and ours over them."""
-    if missing is not None:
+    if missing is not None or measured is None:
         return ["–", ""]
     if measured.median is None:
         return [measured.note, ""]
@@ -30,7 +30,7 @@ def times(compared, names, missing):
     for entry in compared:
         ours = entry.ours.median
         mark = " ‡" if entry.disagreements else ""
-        cells = [f"{entry.group}, {entry.name}{mark}", f"{entry.target:.6e}", entry.ours.note if ours is None else number(ours)]
+        cells = [f"{entry.group}, {entry.name}{mark}", "–" if entry.target is None else f"{entry.target:.6e}", entry.ours.note if ours is None else number(ours)]
         for name in names:
             cells += peer_cells(entry.peers.get(name), missing.get(name), ours)
         best = entry.peers.get("Ceres")

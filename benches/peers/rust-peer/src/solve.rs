@@ -1,7 +1,8 @@
 //! How a problem is solved, and what is told of it: cost over time.
 
 use apex_solver::LinearSolverType;
-use apex_solver::core::problem::{Problem, VarKey};
+use apex_solver::core::VarKey;
+use apex_solver::core::problem::Problem;
 use apex_solver::core::variable::ManifoldVariable;
 use apex_solver::observers::OptObserver;
 use apex_solver::optimizer::OptimizationStatus;

@@ -48,10 +48,16 @@ fn text(graph: &FactorGraph, method: Method) -> String {
     options.solver.max_iterations = 0;
     let adjusted = adjust(graph, &options).expect("a graph that can be adjusted");
     let (estimate, summary) = (&adjusted.estimate, &adjusted.summary);
-    let Loss::Cauchy(scale) = options.loss else { panic!("expected Cauchy's loss, found {:?}", options.loss) };
+    let Loss::Cauchy(scale) = options.loss else {
+        panic!("expected Cauchy's loss, found {:?}", options.loss)
+    };
 
     let mut text = String::from("# Written by peer_export, whose source says what the lines mean.\n");
-    let _ = writeln!(text, "loss cauchy {scale:?}\nsigma {:?}\ncost {:?}", graph.noise.sigma_px, summary.initial_cost);
+    let _ = writeln!(
+        text,
+        "loss cauchy {scale:?}\nsigma {:?}\ncost {:?}",
+        graph.noise.sigma_px, summary.initial_cost
+    );
     for camera in &graph.cameras {
         let PinholeCamera { fx, fy, cx, cy, .. } = camera.projection();
         let _ = writeln!(text, "camera {fx:?} {fy:?} {cx:?} {cy:?}");

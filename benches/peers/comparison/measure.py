@@ -63,6 +63,7 @@ def explore(peer, problem, limits, say):
         run = peer.run(problem, configuration, type(limits)(limits.threads, limits.iterations, seconds))
         if isinstance(run, str):
             reasons.append(f"{configuration[0]}: {run}")
+            say(f"    {peer.name}, {configuration[0]}: {run}")
             continue
         runs.append((configuration, run))
         say(f"    {peer.name}, {configuration[0]}: {run.final_cost:.7e} in {run.seconds:.2f} s, {run.steps} steps, {run.ending}")

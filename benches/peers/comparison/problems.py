@@ -58,11 +58,12 @@ def sequences_of_release(data, programs, folder, wanted):
 
 
 def simulated_sequence(recipe, programs, folder):
-    """A simulated sequence with the graph of its tracked estimate."""
-    graph = folder / f"{recipe}-simulated"
+    """A simulated sequence with the graph of its tracked estimate; the recipe is a file or a name."""
+    name = Path(recipe).stem
+    graph = folder / f"{name}-simulated"
     if not graph.exists():
-        say(f"{recipe}: simulating and tracking")
-        steps = [folder / f"{recipe}-{step}" for step in ("scene", "measured", "tracked")]
+        say(f"{name}: simulating and tracking")
+        steps = [folder / f"{name}-{step}" for step in ("scene", "measured", "tracked")]
         scene, measured, tracked = steps
         for arguments in (
             ["simulate", recipe, "-o", scene],

@@ -134,7 +134,8 @@ pub fn read(path: &str) -> Result<Posed, String> {
                         information[(column, row)] = information[(row, column)];
                     }
                 }
-                let noise = NoiseModel::from_information(information).map_err(|cause| line.complaint(cause))?;
+                let noise =
+                    NoiseModel::from_information(information).map_err(|cause| line.complaint(cause))?;
                 problem.add_residual_block_with_noise(&[*a, *b], factor, None, noise);
             }
             kind => return Err(line.complaint(format!("no kind of line `{kind}`"))),

@@ -36,7 +36,9 @@ impl Request {
     /// Reads the command line.
     pub fn read(mut arguments: impl Iterator<Item = String>) -> Result<Self, String> {
         let usage = "usage: rust-peer graph|bal|pose-graph PATH [--solver S] [--threads N] [--iterations N] [--seconds S] [--target COST]";
-        let (Some(kind), Some(path)) = (arguments.next(), arguments.next()) else { return Err(usage.to_owned()) };
+        let (Some(kind), Some(path)) = (arguments.next(), arguments.next()) else {
+            return Err(usage.to_owned());
+        };
         let (seconds, target) = (f64::INFINITY, f64::NEG_INFINITY);
         let mut request = Self { kind, path, solver: None, threads: 1, iterations: 100, seconds, target };
         while let Some(option) = arguments.next() {
@@ -44,8 +46,12 @@ impl Request {
             let wrong = |_| format!("{option}: expected a number; found {value}");
             match option.as_str() {
                 "--solver" => request.solver = Some(value),
-                "--threads" => request.threads = value.parse().map_err(|_| format!("{option}: found {value}"))?,
-                "--iterations" => request.iterations = value.parse().map_err(|_| format!("{option}: found {value}"))?,
+                "--threads" => {
+                    request.threads = value.parse().map_err(|_| format!("{option}: found {value}"))?
+                }
+                "--iterations" => {
+                    request.iterations = value.parse().map_err(|_| format!("{option}: found {value}"))?
+                }
                 "--seconds" => request.seconds = value.parse().map_err(wrong)?,
                 "--target" => request.target = value.parse().map_err(wrong)?,
                 _ => return Err(format!("no option {option}")),

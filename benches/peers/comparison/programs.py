@@ -186,8 +186,8 @@ def apex(work):
     folder = work / "rust-peer"
     command = ["cargo", "build", "--release", "--locked", "--manifest-path", HERE / "rust-peer" / "Cargo.toml"]
     built(command, "cargo build", env={**os.environ, "CARGO_TARGET_DIR": str(folder)})
-    solvers = [(solver, ["--solver", solver]) for solver in ("explicit-dense", "explicit-sparse", "implicit", "cholesky")]
-    configurations = {("graph", "point"): solvers, ("bal", None): solvers[:3], ("pose-graph", None): solvers[3:]}
+    solvers = [(solver, ["--solver", solver]) for solver in ("explicit-sparse", "implicit", "cholesky")]
+    configurations = {("graph", "point"): solvers, ("bal", None): solvers[:2], ("pose-graph", None): solvers[2:]}
     return Peer("apex-solver", (folder / "release" / "rust-peer",), configurations)
 
 

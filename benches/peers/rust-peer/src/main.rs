@@ -1,7 +1,7 @@
 //! apex-solver on the graphs of `make bench-peers`; says cost over time as one line of JSON.
 //!
 //! `rust-peer graph|bal|pose-graph PATH [--solver S] [--threads N] [--iterations N] [--seconds S] [--target COST]` with the
-//! solvers `explicit-sparse`, `explicit-dense`, `implicit` (points are eliminated) and `cholesky`. Points and poses only.
+//! solvers `explicit-sparse`, `implicit` (points are eliminated) and `cholesky`. Points and poses only.
 
 mod bal;
 mod graph;

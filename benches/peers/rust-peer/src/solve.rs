@@ -82,7 +82,6 @@ pub fn solve(posed: Posed, request: &Request) -> Result<String, String> {
     let usual = if posed.has_points { "explicit-sparse" } else { "cholesky" };
     let solver = match request.solver.as_deref().unwrap_or(usual) {
         "explicit-sparse" => LinearSolverType::ExplicitSparseSchur,
-        "explicit-dense" => LinearSolverType::ExplicitDenseSchur,
         "implicit" => LinearSolverType::ImplicitSparseSchur,
         "cholesky" => LinearSolverType::SparseCholesky,
         name => return Err(format!("no solver {name}")),

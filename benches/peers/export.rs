@@ -24,7 +24,7 @@ use open_structure::format;
 use open_structure::geometry::PinholeCamera;
 use open_structure::structure::{FactorGraph, GraphFactor, PoseRow, registry};
 
-/// The prior that an adjustment of pixels gives to frames whose measurements leave their pose open: radians, metres.
+/// The prior that `adjust` gives to frames whose pixels leave their pose open: radians, metres; as `estimation.rs` has it.
 const WEAK_PRIOR: [f64; 2] = [1.0, 100.0];
 
 fn main() {

@@ -12,8 +12,12 @@ use std::fmt::Write as _;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-/// The version of the lock file.
-const VERSION: &str = "1.5.0";
+/// The version of apex-solver, from the lock file.
+fn version() -> &'static str {
+    let lock = include_str!("../Cargo.lock");
+    let after = lock.split_once("name = \"apex-solver\"\nversion = \"").map(|(_, after)| after);
+    after.and_then(|after| after.split_once('"')).map_or("unknown", |(version, _)| version)
+}
 
 /// A problem, and whether there are points to eliminate.
 pub struct Posed {
@@ -119,8 +123,9 @@ pub fn solve(posed: Posed, request: &Request) -> Result<String, String> {
     };
     let (initial, last) = (result.initial_cost, result.final_cost);
     let mut told = format!(
-        "{{\"peer\": \"apex-solver\", \"version\": \"{VERSION}\", \"initial_cost\": {initial:?}, \"final_cost\": {last:?}, \
-         \"seconds\": {seconds:?}, \"ending\": \"{ending}\", \"iterations\": [[0.0, {initial:?}]"
+        "{{\"peer\": \"apex-solver\", \"version\": \"{}\", \"initial_cost\": {initial:?}, \"final_cost\": {last:?}, \
+         \"seconds\": {seconds:?}, \"ending\": \"{ending}\", \"iterations\": [[0.0, {initial:?}]",
+        version()
     );
     let mut least = initial;
     for (seconds, cost) in costs.lock().map_err(|cause| cause.to_string())?.iter() {

@@ -158,11 +158,13 @@ def ceres(work):
         for eliminate in ("landmarks", "poses")
     ]
     with_lines = [("sparse-schur, points eliminated", ["--solver", "sparse-schur", "--eliminate", "points"])]
+    # Thousands of points seen from a few places leave a reduced system of points that is dense, and too large for memory.
+    of_few_poses = [entry for entry in schur if "poses" not in entry[1] or "iterative-schur" in entry[1]]
     normal = [("normal-cholesky", ["--solver", "normal-cholesky"])]
     configurations = {
         ("graph", "point"): schur,
         ("graph", "point-line"): schur + with_lines,
-        ("bal", None): schur,
+        ("bal", None): of_few_poses,
         ("pose-graph", None): normal,
     }
     return Peer("Ceres", (folder / "ceres_peer",), configurations)

@@ -16,12 +16,12 @@ FUZZ_ARGS ?=
 # Tests, benchmarks and examples stop at what they did not expect, and need not be pretty.
 TESTS_MAY := $(addprefix --allow clippy::,pedantic unwrap_used expect_used print_stdout print_stderr)
 
-.PHONY: help setup demo test lint bench bench-baseline bench-figures bench-instructions bench-instructions-baseline paper-table fuzz conformance-corpus spec
+.PHONY: help setup demo test lint bench bench-baseline bench-figures bench-instructions bench-instructions-baseline bench-peers paper-table fuzz conformance-corpus spec
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
 	@echo 'make bench | bench-baseline | bench-figures | bench-instructions | bench-instructions-baseline'
-	@echo 'make paper-table | fuzz | conformance-corpus | spec | setup'
+	@echo 'make bench-peers | paper-table | fuzz | conformance-corpus | spec | setup'
 
 setup: ## what the other targets need
 	@.ci/setup
@@ -57,6 +57,10 @@ bench-instructions:
 
 bench-instructions-baseline:
 	@benches/instructions/count --store
+
+# Ours and its peers (Ceres, GTSAM, apex-solver) on the same graphs; an hour and more. ARGS: see benches/peers/run --help
+bench-peers:
+	@benches/peers/run $(ARGS)
 
 # The paper's table on the sequences of the first release; an hour and more, and it goes on where it was cut off.
 paper-table:

@@ -114,6 +114,14 @@ struct Candidate {
 }
 
 impl Elimination {
+    /// Where the columns of a variable stand, by its place in a step: reduced blocks first, then eliminated variables.
+    pub(super) fn incidences_of(&self, place: usize) -> &[Incidence] {
+        match place.checked_sub(self.reduced.len()) {
+            None => self.incidences_of_reduced.of(place),
+            Some(eliminated) => self.incidences_of_eliminated.of(eliminated),
+        }
+    }
+
     /// Chooses what to eliminate, and makes the reduced system for it.
     ///
     /// # Errors

@@ -113,11 +113,7 @@ impl NormalEquations {
             gradient.fill(0.0);
             blocks.fill(0.0);
             for variable in first..bounds[chunk + 1] {
-                let incidences = if variable < reduced {
-                    structure.incidences_of_reduced.of(variable)
-                } else {
-                    structure.incidences_of_eliminated.of(variable - reduced)
-                };
+                let incidences = structure.incidences_of(variable);
                 let size = step_start[variable + 1] - step_start[variable];
                 let gradient = &mut gradient[step_start[variable] - step_start[first]..][..size];
                 let block = &mut blocks[block_start[variable] - block_start[first]..][..size * size];
@@ -361,13 +357,7 @@ impl NormalEquations {
             }
         });
         let eliminated_step = &*eliminated_step;
-        let mut targets = Vec::with_capacity(reduced);
-        let mut rest = reduced_step;
-        for window in self.system.start.windows(2) {
-            let (target, tail) = rest.split_at_mut(window[1] - window[0]);
-            rest = tail;
-            targets.push(target);
-        }
+        let targets = split(reduced_step, self.system.start.iter().copied());
         targets.into_par_iter().enumerate().with_min_len(CHUNK).for_each(|(column, target)| {
             target.copy_from_slice(&reduced_right[self.system.start[column]..self.system.start[column + 1]]);
             for (at, edge) in structure.edges_of_reduced.of(column) {
@@ -453,11 +443,7 @@ impl NormalEquations {
             part.fill(0.0);
             let first = bounds[chunk];
             for variable in first..bounds[chunk + 1] {
-                let incidences = if variable < reduced {
-                    structure.incidences_of_reduced.of(variable)
-                } else {
-                    structure.incidences_of_eliminated.of(variable - reduced)
-                };
+                let incidences = structure.incidences_of(variable);
                 let range = self.step_start[variable]..self.step_start[variable + 1];
                 let size = range.len();
                 let target = &mut part[range.start - self.step_start[first]..][..size];

@@ -1,10 +1,11 @@
 //! Times of the solver on simulated sequences: the first steps of each method from a tracked start.
 
+#[path = "data/brief.rs"]
+mod brief;
 #[path = "data/simulated.rs"]
 mod simulated;
 
-use std::time::Duration;
-
+use brief::brief;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use open_structure::adjust::{Method, Options, SolverOptions, adjust};
 use open_structure::covisibility::{GraphOptions, pose_graph, reprojection_graph};
@@ -43,13 +44,5 @@ fn solving(criterion: &mut Criterion) {
     }
 }
 
-/// Medians over seconds, not minutes: all of them together are meant to run often.
-fn brief() -> Criterion {
-    Criterion::default()
-        .sample_size(10)
-        .warm_up_time(Duration::from_millis(500))
-        .measurement_time(Duration::from_secs(3))
-}
-
-criterion_group!(name = benches; config = brief(); targets = solving);
+criterion_group!(name = benches; config = brief(3); targets = solving);
 criterion_main!(benches);

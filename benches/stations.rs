@@ -1,5 +1,7 @@
 //! Times of the stations of a sequence: importing text, simulating, validating, tracking, evaluating.
 
+#[path = "data/brief.rs"]
+mod brief;
 #[path = "data/mod.rs"]
 #[expect(dead_code, reason = "shared with the figures")]
 mod data;
@@ -7,8 +9,8 @@ mod data;
 mod simulated;
 
 use std::path::Path;
-use std::time::Duration;
 
+use brief::brief;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use open_structure::evaluate::{EvaluateOptions, Reconstruction, evaluate};
 use open_structure::format::{self, WriteOptions};
@@ -110,13 +112,5 @@ fn sequences(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// Medians over seconds, not minutes: all of them together are meant to run often.
-fn brief() -> Criterion {
-    Criterion::default()
-        .sample_size(10)
-        .warm_up_time(Duration::from_millis(500))
-        .measurement_time(Duration::from_secs(3))
-}
-
-criterion_group!(name = benches; config = brief(); targets = importing, simulating, sequences);
+criterion_group!(name = benches; config = brief(3); targets = importing, simulating, sequences);
 criterion_main!(benches);

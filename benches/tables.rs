@@ -1,11 +1,12 @@
 //! Throughput of reading and writing, by encoding and kind of numbers, for comparison over time.
 
+#[path = "data/brief.rs"]
+mod brief;
 #[path = "data/mod.rs"]
 #[expect(dead_code, reason = "shared with the figures")]
 mod data;
 
-use std::time::Duration;
-
+use brief::brief;
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use open_structure::format::{self, WriteOptions};
 use open_structure::structure::{FrameId, PointMeasurement, Sequence};
@@ -62,13 +63,5 @@ fn tables(criterion: &mut Criterion) {
     }
 }
 
-/// Medians over seconds, not minutes: all of them together are meant to run often.
-fn brief() -> Criterion {
-    Criterion::default()
-        .sample_size(10)
-        .warm_up_time(Duration::from_millis(500))
-        .measurement_time(Duration::from_secs(2))
-}
-
-criterion_group!(name = benches; config = brief(); targets = tables);
+criterion_group!(name = benches; config = brief(2); targets = tables);
 criterion_main!(benches);

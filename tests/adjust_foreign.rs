@@ -3,6 +3,8 @@
 //! Real files are looked for in `../shared/data` beside the workspace, or where `OPEN_STRUCTURE_DATA` says.
 #![expect(clippy::unwrap_used, clippy::print_stderr, reason = "tests")]
 
+mod shared_data;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -13,6 +15,7 @@ use open_structure::exchange::{G2oGraph, G2oKind, ImportNames, from_g2o, read_ba
 use open_structure::format;
 use open_structure::structure::{Estimate, FactorGraph};
 use serde_json::Value;
+use shared_data::shared;
 use tempfile::TempDir;
 
 /// Four poses in a row with a loop closure that disagrees, in space: weights differ by axis.
@@ -41,18 +44,6 @@ EDGE_SE2 0 7 2.9 0.1 0.2 4 1 0 9 2 50
 
 fn os() -> Command {
     Command::cargo_bin("os").unwrap()
-}
-
-/// A file of the shared data; tells when it is not there.
-fn shared(name: &str) -> Option<PathBuf> {
-    let data = std::env::var_os("OPEN_STRUCTURE_DATA")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
-    let path = data.join(name);
-    if !path.exists() {
-        eprintln!("SKIPPED: {} is not here; set OPEN_STRUCTURE_DATA to read it", path.display());
-        return None;
-    }
-    Some(path)
 }
 
 fn written(folder: &TempDir, name: &str, text: &str) -> PathBuf {

@@ -4,6 +4,8 @@
 //! `OPEN_STRUCTURE_DATA` says.
 #![expect(clippy::unwrap_used, clippy::print_stderr, reason = "tests")]
 
+mod shared_data;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command as Process;
@@ -13,22 +15,11 @@ use open_structure::exchange::{self, ImportNames, from_bal, from_g2o, read_bal, 
 use open_structure::format;
 use open_structure::geometry::Pose;
 use open_structure::structure::{FactorGraph, FrameId, PoseRow};
+use shared_data::shared;
 use tempfile::TempDir;
 
 fn os() -> Command {
     Command::cargo_bin("os").unwrap()
-}
-
-/// A file of the shared data; tells when it is not there.
-fn shared(name: &str) -> Option<PathBuf> {
-    let data = std::env::var_os("OPEN_STRUCTURE_DATA")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
-    let path = data.join(name);
-    if !path.exists() {
-        eprintln!("SKIPPED: {} is not here; set OPEN_STRUCTURE_DATA to read it", path.display());
-        return None;
-    }
-    Some(path)
 }
 
 fn names() -> ImportNames {

@@ -16,12 +16,12 @@ FUZZ_ARGS ?=
 # Tests, benchmarks and examples stop at what they did not expect, and need not be pretty.
 TESTS_MAY := $(addprefix --allow clippy::,pedantic unwrap_used expect_used print_stdout print_stderr)
 
-.PHONY: help setup demo test lint bench bench-baseline bench-figures bench-instructions bench-instructions-baseline bench-peers paper-table fuzz conformance-corpus spec
+.PHONY: help setup demo test lint bench bench-baseline bench-figures bench-instructions bench-instructions-baseline bench-peers bench-scale paper-table fuzz conformance-corpus spec page book package
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
 	@echo 'make bench | bench-baseline | bench-figures | bench-instructions | bench-instructions-baseline'
-	@echo 'make bench-peers | paper-table | fuzz | conformance-corpus | spec | setup'
+	@echo 'make bench-peers | bench-scale | paper-table | fuzz | conformance-corpus | spec | page | book | package | setup'
 
 setup: ## what the other targets need
 	@.ci/setup
@@ -62,6 +62,10 @@ bench-instructions-baseline:
 bench-peers:
 	@benches/peers/run $(ARGS)
 
+# How time and memory of an adjustment grow up to ten million observations; half an hour. ARGS: see benches/scale/run --help
+bench-scale:
+	@benches/scale/run $(ARGS)
+
 # The paper's table on the sequences of the first release; an hour and more, and it goes on where it was cut off.
 paper-table:
 	@benches/paper-table
@@ -84,4 +88,19 @@ conformance-corpus:
 spec:
 	cargo build --workspace --bins --locked
 	UPDATE_SPEC=1 UPDATE_SAMPLE=1 UPDATE_README=1 cargo test --workspace --locked \
-	  --test spec_sync --test sample_sequence --test readme --test simulation --test fetch
+	  --test spec_sync --test sample_sequence --test documents --test simulation --test fetch
+
+# The code and style of the page that `os report` writes, bundled anew of src/report/page/src.
+page:
+	npm --prefix src/report/page ci --ignore-scripts --no-audit --no-fund
+	npm --prefix src/report/page run build
+
+# The book, into out/book.
+book:
+	@command -v mdbook > /dev/null || cargo install mdbook --locked --no-default-features --features search
+	mdbook build docs
+
+# Debian packages and a tarball, into out/package, and a look whether all is in them.
+package:
+	@packaging/package
+	@packaging/check

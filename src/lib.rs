@@ -15,6 +15,7 @@ pub mod fetch;
 pub mod format;
 pub mod geometry;
 pub mod plot;
+pub mod report;
 pub mod simulate;
 pub mod statistics;
 pub mod structure;

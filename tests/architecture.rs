@@ -42,6 +42,7 @@ const ROOMS: &[(&str, &[&str])] = &[
         ],
     ),
     ("validate", &["geometry", "structure", "format", "simulate", "track", "adjust", "evaluate"]),
+    ("report", &["geometry", "structure", "format", "statistics", "plot", "evaluate", "validate"]),
     (
         "cli",
         &[
@@ -61,6 +62,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "exchange",
             "benchmark",
             "validate",
+            "report",
         ],
     ),
 ];
@@ -72,6 +74,12 @@ const LIBRARIES: &[(&[&str], &[&str], &str)] = &[
         &["src/format/"],
         "files are the business of the room `format`",
     ),
+    (
+        &["krilla", "krilla_svg", "resvg", "ttf_parser"],
+        &["src/plot/paper/"],
+        "letters and files of figures are the business of `plot::paper`",
+    ),
+    (&["maud"], &["src/report/"], "pages are the business of the room `report`"),
     (&["ureq"], &["src/fetch/"], "the network is the business of the room `fetch`"),
     (
         &["tar", "flate2", "zip"],

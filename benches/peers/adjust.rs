@@ -1,7 +1,7 @@
 //! How long an adjustment takes to reach a cost, the graph being in memory: our side of `make bench-peers`.
 //!
-//! `adjust PATH METHOD [TARGET [THREADS]]` prints JSON: the seconds until the cost was at most TARGET (null if it never was), those until
-//! the end, the steps of both, and the costs.
+//! `adjust PATH METHOD [TARGET [THREADS]]` prints JSON: the seconds until the cost was at most TARGET (null if it never was), where it
+//! ends; those until the end, the steps of both, and the costs.
 //!
 //! | PATH | METHOD |
 //! |---|---|
@@ -47,7 +47,7 @@ fn main() {
             if reached.is_none() && step.accepted && step.cost <= target {
                 reached = Some((start.elapsed().as_secs_f64(), steps));
             }
-            true
+            reached.is_none()
         })
     });
     let total = start.elapsed().as_secs_f64();

@@ -1,8 +1,8 @@
 //! The program `os-convert`: raw datasets to sequences.
 
-use clap::Parser;
+use clap::{CommandFactory as _, Parser};
 use open_structure::datasets::Dataset;
-use open_structure_converters::command::{Outcome, rgbd, text_release};
+use open_structure_converters::command::{Outcome, completions, man, rgbd, text_release};
 use std::io::{self, Write as _};
 use std::process::ExitCode;
 
@@ -31,6 +31,8 @@ enum Command {
     /// Reads the left camera of V1 and the front one of V2: images, depth maps, and poses, which are north-east-down.
     #[command(name = "tartanair")]
     TartanAir(rgbd::Args),
+    Completions(completions::Args),
+    Man(man::Args),
 }
 
 fn main() -> ExitCode {
@@ -48,6 +50,8 @@ fn main() -> ExitCode {
         Command::Tum(args) => rgbd::run(Dataset::Tum, args, &mut stdout, &mut stderr),
         Command::Icl(args) => rgbd::run(Dataset::Icl, args, &mut stdout, &mut stderr),
         Command::TartanAir(args) => rgbd::run(Dataset::Tartanair, args, &mut stdout, &mut stderr),
+        Command::Completions(args) => completions::run(args, Cli::command(), &mut stdout),
+        Command::Man(args) => man::run(args, Cli::command(), &mut stdout),
     };
     let result = result.and_then(|outcome| Ok(stdout.flush().map(|()| outcome)?));
     let outcome = result.unwrap_or_else(|error| {

@@ -8,7 +8,6 @@ use super::loss::Loss;
 use super::minimise::{SolverOptions, Step, minimise_watched};
 use super::observations::root;
 use super::parametrisation::VectorSpace;
-use super::plan::Eliminate;
 use super::problem::{Problem, Variable};
 use super::summary::{Reason, Summary};
 use crate::structure::FrameId;
@@ -71,12 +70,7 @@ pub fn adjust_bal(
 ) -> Result<BalAdjusted, Error> {
     let mut summary = Summary::default();
     let mut posed = Posed::of(bundle, loss, &mut summary)?;
-    let mut solver = *solver;
-    if solver.eliminate == Eliminate::Cheapest && posed.problem.len() > 2 * bundle.cameras.len() {
-        // Points that outnumber cameras go first; factorising leaves by the thousand is dearer than its multiplications say.
-        solver.eliminate = Eliminate::Landmarks;
-    }
-    let minimum = minimise_watched(&mut posed.problem, &solver, watch)?;
+    let minimum = minimise_watched(&mut posed.problem, solver, watch)?;
     summary.initial_cost = minimum.initial_cost;
     summary.final_cost = minimum.final_cost;
     summary.ending = minimum.ending;

@@ -16,8 +16,16 @@ pub(super) struct BlockPattern {
 pub(super) struct Ordering {
     /// The block that comes at each place.
     pub(super) order: Vec<usize>,
-    /// Multiplications of a sparse factorisation in this order.
-    pub(super) sparse: f64,
+    /// What a sparse factorisation in this order takes.
+    pub(super) sparse: Work,
+}
+
+/// What a sparse factorisation takes.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Work {
+    pub(super) multiplications: f64,
+    /// Numbers of the factor below its diagonal blocks.
+    pub(super) entries: f64,
 }
 
 impl BlockPattern {
@@ -72,7 +80,7 @@ impl BlockPattern {
     pub(super) fn ordering(&self, sizes: &[usize]) -> Option<Ordering> {
         let blocks = self.len();
         if blocks == 0 {
-            return Some(Ordering { order: Vec::new(), sparse: 0.0 });
+            return Some(Ordering { order: Vec::new(), sparse: Work::default() });
         }
         // The upper triangle, column by column, is the lower one row by row.
         let (starts, rows) = self.upper(None);
@@ -83,8 +91,22 @@ impl BlockPattern {
         let stack = MemStack::new(&mut memory);
         amd::order_maybe_unsorted(&mut order, &mut place, upper, amd::Control::default(), stack).ok()?;
         let order: Vec<usize> = order.iter().map(|block| *block as usize).collect();
-        let sparse = self.cost(&order, sizes)?;
+        let sparse = self.work(&order, sizes)?;
         Some(Ordering { order, sparse })
+    }
+
+    /// What a sparse factorisation takes at least, in whatever order: fill only adds to the pattern, and columns of one length cost
+    /// least.
+    ///
+    /// * `sizes` — rows of each block.
+    pub(super) fn least_work(&self, sizes: &[usize]) -> Work {
+        let rows: usize = sizes.iter().sum();
+        let entries = |column: usize| {
+            let below: usize = self.below(column).iter().map(|row| sizes[*row as usize]).sum();
+            sizes[column] * below
+        };
+        let entries = (0..self.len()).map(entries).sum::<usize>() as f64;
+        Work { multiplications: 0.5 * entries * entries / (rows as f64).max(1.0), entries }
     }
 
     /// Starts and row indices of the upper triangle with its diagonal, its blocks at other places.
@@ -108,8 +130,8 @@ impl BlockPattern {
         (starts, rows)
     }
 
-    /// Multiplications of a sparse factorisation with the blocks in an order: `½ Σ |column of L|²`, column by column of numbers.
-    fn cost(&self, order: &[usize], sizes: &[usize]) -> Option<f64> {
+    /// What a sparse factorisation with the blocks in an order takes: `½ Σ |column of L|²` multiplications, column by column of numbers.
+    fn work(&self, order: &[usize], sizes: &[usize]) -> Option<Work> {
         let blocks = self.len();
         let mut place = vec![0; blocks];
         order.iter().enumerate().for_each(|(at, block)| place[*block] = at);
@@ -124,13 +146,15 @@ impl BlockPattern {
         // The fill of blocks of unequal size needs the rows, not only their count.
         let factor = simplicial::factorize_simplicial_symbolic_cholesky(upper, tree, &counts, stack).ok()?;
         let (starts, rows) = (factor.col_ptr(), factor.row_idx());
-        let mut cost = 0.0;
+        let mut work = Work::default();
         for (column, block) in order.iter().enumerate() {
             let below = &rows[starts[column] as usize..starts[column + 1] as usize];
             let height: usize = below.iter().map(|row| sizes[order[*row as usize]]).sum();
-            cost += 0.5 * sizes[*block] as f64 * (height as f64) * (height as f64);
+            let entries = (sizes[*block] * height) as f64;
+            work.entries += entries;
+            work.multiplications += 0.5 * entries * height as f64;
         }
-        Some(cost)
+        Some(work)
     }
 }
 
@@ -151,7 +175,8 @@ mod tests {
         assert_eq!(sorted, (0..40).collect::<Vec<_>>());
         // Columns of two blocks, the last of one.
         let expected = 0.5 * 6.0 * (39.0 * 144.0 + 36.0);
-        assert!((ordering.sparse - expected).abs() < 1e-9, "{} {expected}", ordering.sparse);
+        let found = ordering.sparse.multiplications;
+        assert!((found - expected).abs() < 1e-9, "{found} {expected}");
     }
 
     #[test]

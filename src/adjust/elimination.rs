@@ -1,24 +1,16 @@
 //! Which variables are eliminated first, and which factors touch which variable.
 
-use super::block_pattern::{BlockPattern, Ordering};
 use super::error::Error;
 use super::minimise::SolverOptions;
-use super::panels::{Panels, groups};
-use super::plan::{Choice, Eliminate, Factorisation, Plan};
+use super::panels::Panels;
+use super::plan::{Eliminate, Plan};
 use super::problem::Problem;
 use super::reduced_system::ReducedSystem;
+use super::weighing::{Candidate, Outline, weigh};
+use rayon::prelude::*;
 
-/// Pairs of blocks above which an elimination is not looked at, unless there is no other.
+/// Pairs of blocks above which an elimination is not looked at, unless there is no better one.
 const MOST_PAIRS: f64 = 2e8;
-
-/// How many times slower than in a dense factorisation multiplications run: those of the elimination, of a sparse factorisation, and of one
-/// whose leaves are single variables. Measured on the sequences of the first release.
-const SMALL_BLOCKS: f64 = 17.0;
-const SPARSE: f64 = 2.0;
-const SPARSE_LEAVES: f64 = 6.5;
-
-/// Unknowns up to which a system is always dense.
-const ALWAYS_DENSE: usize = 200;
 
 /// Where a variable stands in the normal equations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,17 +94,6 @@ pub(super) struct Elimination {
     pub(super) edge_start: Vec<usize>,
 }
 
-/// A choice of what to eliminate, with the cost of it.
-struct Candidate {
-    eliminate: Vec<bool>,
-    pattern: BlockPattern,
-    blocks: Vec<usize>,
-    ordering: Ordering,
-    /// Eliminated variables whose products are made together.
-    groups: Vec<Vec<usize>>,
-    choice: Choice,
-}
-
 impl Elimination {
     /// Where the columns of a variable stand, by its place in a step: reduced blocks first, then eliminated variables.
     pub(super) fn incidences_of(&self, place: usize) -> &[Incidence] {
@@ -120,6 +101,16 @@ impl Elimination {
             None => self.incidences_of_reduced.of(place),
             Some(eliminated) => self.incidences_of_eliminated.of(eliminated),
         }
+    }
+
+    /// Where the numbers of an edge's block stand among those of all.
+    pub(super) fn numbers_of(&self, edge: usize) -> std::ops::Range<usize> {
+        self.edge_start[edge]..self.edge_start[edge + 1]
+    }
+
+    /// Where the numbers of an eliminated variable's first edge begin.
+    pub(super) fn first_tie(&self, at: usize) -> usize {
+        self.edge_start[self.edges.start[at]]
     }
 
     /// Chooses what to eliminate, and makes the reduced system for it.
@@ -130,8 +121,6 @@ impl Elimination {
         problem: &Problem,
         options: &SolverOptions,
     ) -> Result<(Self, ReducedSystem, Plan), Error> {
-        let mut best: Option<Candidate> = None;
-        let mut plan = Plan::default();
         let mut choices = choices(problem);
         if options.eliminate != Eliminate::Cheapest {
             choices.retain(|choice| kind_of(problem, choice) == options.eliminate);
@@ -139,26 +128,23 @@ impl Elimination {
                 return Err(Error::Elimination { asked: options.eliminate.name() });
             }
         }
-        let pairs: Vec<f64> = choices.iter().map(|choice| pairs(problem, choice)).collect();
-        let fewest = pairs.iter().copied().fold(f64::INFINITY, f64::min);
-        for (choice, pairs) in choices.into_iter().zip(pairs) {
-            if pairs > MOST_PAIRS && pairs > fewest {
-                continue;
-            }
-            let Some(candidate) = Candidate::of(problem, choice, options.factorisation) else { continue };
-            plan.choices.push(candidate.choice.clone());
-            if best.as_ref().is_none_or(|best| candidate.choice.cost() < best.choice.cost()) {
-                plan.taken = plan.choices.len() - 1;
-                best = Some(candidate);
-            }
-        }
-        let best = best.ok_or(Error::TooLarge { most: u32::MAX as usize, found: problem.len() })?;
-        let blocks: Vec<usize> = best.ordering.order.iter().map(|block| best.blocks[*block]).collect();
-        let sizes: Vec<usize> = blocks.iter().map(|variable| freedom(problem, *variable)).collect();
-        let pattern = best.pattern.reordered(&best.ordering.order);
-        let is_dense = best.choice.factorisation == Factorisation::Dense;
-        let system = ReducedSystem::new(pattern, &sizes, is_dense)?;
-        Ok((Self::of(problem, &best.eliminate, &best.groups, blocks, sizes), system, plan))
+        let pairs = |choice: &Vec<bool>| pairs(problem, choice);
+        let eliminations = choices.iter().filter(|choice| choice.contains(&true));
+        let fewest = eliminations.map(pairs).fold(f64::INFINITY, f64::min);
+        choices.retain(|choice| pairs(choice) <= fewest.max(MOST_PAIRS));
+        let outlines: Vec<Outline> =
+            choices.into_par_iter().map(|choice| Outline::of(problem, choice)).collect();
+        let (best, plan) = weigh(problem, outlines, options.factorisation)
+            .ok_or(Error::TooLarge { most: u32::MAX as usize, found: problem.len() })?;
+        let Candidate { outline, ordering, pattern, .. } = best;
+        let reduced: Vec<usize> = ordering.order.iter().map(|block| outline.blocks[*block]).collect();
+        let sizes: Vec<usize> = reduced.iter().map(|variable| freedom(problem, *variable)).collect();
+        let factorisation = plan.choice().factorisation;
+        let (system, structure) = rayon::join(
+            || ReducedSystem::new(pattern.reordered(&ordering.order), &sizes, factorisation),
+            || Self::of(problem, &outline.eliminate, &outline.groups, reduced, sizes.clone()),
+        );
+        Ok((structure, system?, plan))
     }
 
     fn of(
@@ -270,7 +256,7 @@ fn pair(incidence: &Incidence, other: &Incidence, named: usize) -> Pair {
     }
 }
 
-fn freedom(problem: &Problem, variable: usize) -> usize {
+pub(super) fn freedom(problem: &Problem, variable: usize) -> usize {
     problem.spaces[problem.space_of[variable] as usize].freedom()
 }
 
@@ -299,7 +285,10 @@ pub(super) fn for_each_factor(problem: &Problem, mut each: impl FnMut(&[(usize, 
     }
 }
 
-/// Sets of variables that may be eliminated: whole kinds, no two of which meet in a factor; and none.
+/// Part of a kind that is independent at least, where not all of it is.
+const MOST_OF_A_KIND: f64 = 0.75;
+
+/// Sets of variables that may be eliminated, no two of which meet in a factor: whole kinds, most of a kind, and none.
 fn choices(problem: &Problem) -> Vec<Vec<bool>> {
     let kinds = problem.spaces.len();
     // meets[a][b]: a factor has free variables of both kinds, or two of the one.
@@ -330,10 +319,36 @@ fn choices(problem: &Problem) -> Vec<Vec<bool>> {
         }
     }
     let of_set = |set: Vec<bool>| problem.space_of.iter().map(|kind| set[*kind as usize]).collect();
-    sets.into_iter().map(of_set).collect()
+    let of_most = (0..kinds).filter(|kind| meets[*kind][*kind]).filter_map(|kind| most_of(problem, kind));
+    sets.into_iter().map(of_set).chain(of_most).collect()
 }
 
-/// Sets of variables that do not meet in a factor: whole kinds.
+/// Variables of a kind of which few meet others of it, as poses do where motion carries some: those of them that do not meet, as many as
+/// are found by beginning with those that meet the fewest. `None` where that leaves too many.
+fn most_of(problem: &Problem, kind: usize) -> Option<Vec<bool>> {
+    let is_of_kind = |variable: usize| !problem.held[variable] && problem.space_of[variable] as usize == kind;
+    let mut met: Vec<Vec<usize>> = vec![Vec::new(); problem.len()];
+    for layout in &problem.layout.batches {
+        for variables in layout.variables.chunks_exact(layout.arity.max(1)) {
+            for (at, a) in variables.iter().enumerate().filter(|(_, a)| is_of_kind(a.index())) {
+                for b in variables[at + 1..].iter().filter(|b| is_of_kind(b.index())) {
+                    met[a.index()].push(b.index());
+                    met[b.index()].push(a.index());
+                }
+            }
+        }
+    }
+    let mut order: Vec<usize> = (0..problem.len()).filter(|variable| is_of_kind(*variable)).collect();
+    order.sort_by_key(|variable| met[*variable].len());
+    let (mut set, mut count) = (vec![false; problem.len()], 0);
+    for variable in &order {
+        set[*variable] = met[*variable].iter().all(|other| !set[*other]);
+        count += usize::from(set[*variable]);
+    }
+    (count as f64 >= MOST_OF_A_KIND * order.len() as f64).then_some(set)
+}
+
+/// Sets of variables that do not meet in a factor: whole kinds, or most of one.
 pub(super) fn independent_sets(problem: &Problem) -> Vec<Vec<bool>> {
     choices(problem).into_iter().filter(|set| set.contains(&true)).collect()
 }
@@ -350,87 +365,12 @@ fn pairs(problem: &Problem, eliminate: &[bool]) -> f64 {
 }
 
 /// What a choice is called.
-fn kind_of(problem: &Problem, eliminate: &[bool]) -> Eliminate {
+pub(super) fn kind_of(problem: &Problem, eliminate: &[bool]) -> Eliminate {
     let is_pose = |variable: usize| problem.spaces[problem.space_of[variable] as usize].is_pose();
     let mut chosen = (0..problem.len()).filter(|variable| eliminate[*variable]).peekable();
     match chosen.peek().copied() {
         None => Eliminate::Nothing,
         Some(_) if chosen.any(is_pose) => Eliminate::Poses,
         Some(_) => Eliminate::Landmarks,
-    }
-}
-
-impl Candidate {
-    fn of(problem: &Problem, eliminate: Vec<bool>, factorisation: Factorisation) -> Option<Self> {
-        let blocks: Vec<usize> = (0..problem.len()).filter(|v| !eliminate[*v] && !problem.held[*v]).collect();
-        let mut block_of = vec![usize::MAX; problem.len()];
-        blocks.iter().enumerate().for_each(|(at, v)| block_of[*v] = at);
-        let sizes: Vec<usize> = blocks.iter().map(|v| freedom(problem, *v)).collect();
-        // Cliques: the reduced blocks around each eliminated variable, and those of factors without one.
-        let mut around: Vec<Vec<u32>> = vec![Vec::new(); problem.len()];
-        let mut direct: Vec<Vec<u32>> = vec![Vec::new(); blocks.len()];
-        let name = |block: usize| u32::try_from(block).unwrap_or(u32::MAX);
-        for layout in &problem.layout.batches {
-            for variables in layout.variables.chunks_exact(layout.arity.max(1)) {
-                let centre = variables.iter().find(|v| eliminate[v.index()] && !problem.held[v.index()]);
-                for (at, variable) in variables.iter().enumerate() {
-                    let block = block_of[variable.index()];
-                    if block == usize::MAX {
-                        continue;
-                    }
-                    match centre {
-                        Some(centre) => around[centre.index()].push(name(block)),
-                        None => {
-                            for other in &variables[at + 1..] {
-                                let other = block_of[other.index()];
-                                if other != usize::MAX {
-                                    direct[block.min(other)].push(name(block.max(other)));
-                                }
-                            }
-                        }
-                    }
-                }
-            }
-        }
-        let mut cliques_of = vec![Vec::new(); blocks.len()];
-        for (variable, clique) in around.iter_mut().enumerate() {
-            clique.sort_unstable();
-            clique.dedup();
-            clique.iter().for_each(|block| cliques_of[*block as usize].push(variable));
-        }
-        // Poses are alike when they follow each other, landmarks when the same frames see them.
-        let mut order: Vec<usize> =
-            (0..problem.len()).filter(|v| eliminate[*v] && !around[*v].is_empty()).collect();
-        if kind_of(problem, &eliminate) != Eliminate::Poses {
-            order.sort_by_key(|v| (around[*v][0], around[*v][around[*v].len() - 1], *v));
-        }
-        let (groups, large, small) = groups(&order, |v| &around[v], |v| freedom(problem, v), &sizes);
-        let pattern = BlockPattern::of(blocks.len(), |column, add| {
-            direct[column].iter().for_each(|row| add(*row as usize));
-            for clique in &cliques_of[column] {
-                let clique = &around[*clique];
-                let from = clique.partition_point(|row| (*row as usize) <= column);
-                clique[from..].iter().for_each(|row| add(*row as usize));
-            }
-        });
-        let ordering = pattern.ordering(&sizes)?;
-        let rows: usize = sizes.iter().sum();
-        let has_leaves = !eliminate.contains(&true);
-        let slower = if has_leaves { SPARSE_LEAVES } else { SPARSE };
-        let [dense, sparse] = [(rows as f64).powi(3) / 6.0, slower * ordering.sparse];
-        let is_dense = match factorisation {
-            Factorisation::Cheapest => rows <= ALWAYS_DENSE || dense < sparse,
-            Factorisation::Dense => true,
-            Factorisation::Sparse => false,
-        };
-        let choice = Choice {
-            eliminate: kind_of(problem, &eliminate),
-            eliminated: (0..problem.len()).filter(|v| eliminate[*v] && !problem.held[*v]).count(),
-            reduced: rows,
-            factorisation: if is_dense { Factorisation::Dense } else { Factorisation::Sparse },
-            elimination_cost: large + SMALL_BLOCKS * small,
-            factorisation_cost: if is_dense { dense } else { sparse },
-        };
-        Some(Self { eliminate, pattern, blocks, ordering, groups, choice })
     }
 }

@@ -89,6 +89,18 @@ impl Loss {
         }
     }
 
+    /// `2 ρ''(s)`, by which the loss bends down along the residual; of a residual of no length zero.
+    ///
+    /// * `weight` — `ρ'(s)`.
+    #[inline]
+    pub(super) fn bend(self, squared: f64, weight: f64) -> f64 {
+        match self {
+            Self::Cauchy(scale) => -2.0 * weight * weight / (scale * scale),
+            _ if squared > 0.0 => weight * (self.stiffness(squared) - 1.0) / squared,
+            _ => 0.0,
+        }
+    }
+
     /// Whether the scale is a number that a loss can have: finite and over zero.
     #[must_use]
     pub fn is_valid(self) -> bool {
@@ -238,6 +250,8 @@ mod tests {
                     _ => false,
                 };
                 prop_assert!(kink || (difference - weight * loss.stiffness(r * r)).abs() < 1e-5, "{loss:?} at {r}");
+                let bent = weight + loss.bend(r * r, weight) * r * r;
+                prop_assert!((bent - weight * loss.stiffness(r * r)).abs() < 1e-12, "{loss:?} at {r}");
             }
         }
     }

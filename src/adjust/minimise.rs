@@ -129,13 +129,18 @@ pub struct Minimum {
     pub plan: Plan,
 }
 
+/// A step that lowers the cost by less than this part of it is near the end. Before, steps need not be exact, and one that knows the
+/// loss would go far, and leave as outliers what weights that are held bring back.
+const NEAR: f64 = 1e-3;
+
 /// A step is taken when it keeps at least this part of its promise.
 const LEAST_PROMISE: f64 = 1e-4;
 
 /// Moves the variables of a problem to the nearest least cost.
 ///
 /// Steps solve the normal equations by blocks; one set of variables that do not meet in a factor is eliminated first, the one that makes
-/// the rest cheapest. Levenberg-Marquardt: `λ` shrinks by `max(1/3, 1 − (2ϱ − 1)³)` after a step with gain ratio `ϱ`, and grows by
+/// the rest cheapest. What is left is factorised, or solved by conjugate gradients as long as these cost less: far from the end, where
+/// steps need not be exact. Levenberg-Marquardt: `λ` shrinks by `max(1/3, 1 − (2ϱ − 1)³)` after a step with gain ratio `ϱ`, and grows by
 /// 2, 4, 8, … after steps that were rejected (Nielsen). With a robust loss, steps near the end are found with the loss as it is, not
 /// with its weights held, and mended where the way bends. The result has the same bits on any number of threads.
 ///
@@ -182,13 +187,15 @@ pub fn minimise_watched(
     let is_damped = options.optimiser == Optimiser::LevenbergMarquardt;
     let mut refinement = if is_damped { Refinement::new(problem, &equations) } else { None };
     let mut step = vec![0.0; equations.unknowns()];
-    let mut fresh = true;
+    let (mut fresh, mut is_near) = (true, false);
     for _ in 0..options.max_iterations {
         let gradient_max = equations.gradient_max();
         let mut tried = Step { cost, gradient_max, damping: region.damping(), ..Step::default() };
-        let mut promise = region.step(problem, &mut equations, fresh, &mut step);
-        if let (Some(promise), Some(refinement)) = (&mut promise, &mut refinement) {
-            *promise = refinement.lengthen(problem, &equations, region.damping, *promise, &mut step);
+        let mut promise = region.step(problem, &mut equations, fresh, is_near, &mut step);
+        let mut refinement = refinement.as_mut();
+        if is_near && let (Some(promise), Some(refinement)) = (&mut promise, &mut refinement) {
+            *promise =
+                refinement.lengthen(problem, &mut equations, region.damping, cost, *promise, &mut step);
         }
         // A step that follows one that was taken is mostly taken as well: what is linear there is made at once.
         let mut is_made = std::mem::replace(&mut fresh, false);
@@ -203,10 +210,10 @@ pub fn minimise_watched(
             let mut there =
                 if is_made { problem.linearise(&moved, &mut next) } else { problem.cost_at(&moved) };
             let mut ratio = (cost - there) / promise;
-            if let Some(refinement) = &mut refinement {
-                if is_made && there.is_finite() && refinement.is_crooked(ratio) {
+            if is_near && let Some(refinement) = &mut refinement {
+                if is_made && there.is_finite() && Refinement::is_crooked(ratio) {
                     there = refinement.settle(problem, &mut moved, &mut next, there);
-                    ratio = ((cost - there) / promise).min(Refinement::CAUTIOUS);
+                    ratio = ((cost - there) / promise).min(Refinement::SETTLED);
                 }
                 if !keeps(cost - there, ratio)
                     && let Some(promise) = refinement.shorten(&mut step)
@@ -230,12 +237,13 @@ pub fn minimise_watched(
                 cost = there;
                 tried.cost = cost;
                 tried.accepted = true;
+                is_near |= tried.decrease < NEAR * cost;
                 region.succeed(ratio, size);
                 fresh = true;
             } else {
                 region.fail(size);
             }
-            refinement.iter_mut().for_each(|refinement| refinement.learn(&tried, &step));
+            refinement.into_iter().for_each(|refinement| refinement.learn(&tried, &step));
             if promise <= rounding && !tried.accepted {
                 minimum.steps.push(tried);
                 minimum.ending = Ending::Stuck;

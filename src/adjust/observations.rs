@@ -45,7 +45,8 @@ pub(super) struct PointView {
     pub(super) camera: PinholeCamera,
     pub(super) pixel: [f64; 2],
     pub(super) depth: Option<f64>,
-    pub(super) information: Option<DMatrix<f64>>,
+    /// In a box, for most have none and there may be millions of views.
+    pub(super) information: Option<Box<DMatrix<f64>>>,
 }
 
 /// A line in a frame.
@@ -217,7 +218,8 @@ impl Observations {
         if measured.is_some() && depth.is_none() && self.noise.depth != DepthNoise::Unknown {
             summary.point_factors.exclude(Reason::NoDepth);
         }
-        let information = information(factor, numbers.len(), if depth.is_some() { 3 } else { 2 })?;
+        let information =
+            information(factor, numbers.len(), if depth.is_some() { 3 } else { 2 })?.map(Box::new);
         Ok(PointView { frame, point, camera, pixel: [numbers[0], numbers[1]], depth, information })
     }
 

@@ -1,7 +1,10 @@
 //! Panels: eliminated variables that are tied to much the same blocks, whose products are made together as one large one.
 
 use super::elimination::Lists;
+use super::parts::for_each_part;
 use super::reduced_system::ReducedSystem;
+use super::schur::{MOST_TIE, Schur};
+use super::small_blocks::multiply;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::{Accum, MatMut, MatRef, Par};
 use rayon::prelude::*;
@@ -39,10 +42,13 @@ pub(super) struct Panels {
     all: Vec<Panel>,
     /// For each eliminated variable, whether a panel has it.
     pub(super) has: Vec<bool>,
-    batch: Vec<Product>,
 }
 
-/// What one panel is multiplied with and to; kept from one step to the next.
+/// Room for the products of some panels, kept from one step to the next.
+#[derive(Default)]
+pub(super) struct Products(Vec<Product>);
+
+/// What one panel is multiplied with and to.
 #[derive(Default)]
 struct Product {
     ties: Vec<f64>,
@@ -131,40 +137,30 @@ impl Panels {
             let rows = members.iter().map(|member| heights[*member as usize]).sum();
             Panel { members, blocks, columns, rows }
         });
-        let all = panels.collect();
-        let batch = (0..BATCH).map(|_| Product::default()).collect();
-        Self { all, has, batch }
+        Self { all: panels.collect(), has }
     }
 
     /// Takes `Σ Wᵀ H⁻¹ W` of all panels off the values of a reduced system.
     ///
     /// Every entry is summed in the order of the panels, however many threads there are.
     ///
-    /// * `ties`, `solved` — `W` and `H⁻¹ W` by edge, with `edge_start` where each begins.
+    /// * `room` — whatever it holds; `values` — of the system, its block columns at `column_starts`.
     pub(super) fn subtract(
-        &mut self,
-        edges: &Lists<u32>,
-        edge_start: &[usize],
-        [ties, solved]: [&[f64]; 2],
+        &self,
+        schur: &Schur<'_>,
         system: &ReducedSystem,
+        room: &mut Products,
         values: &mut [f64],
         column_starts: &[usize],
     ) {
-        let Self { all, batch, .. } = self;
-        for panels in all.chunks(BATCH) {
+        let batch = &mut room.0;
+        batch.resize_with(BATCH.min(self.all.len()), Product::default);
+        for panels in self.all.chunks(BATCH) {
             batch.par_iter_mut().zip(panels).with_max_len(1).for_each(|(product, panel)| {
-                product.make(panel, edges, edge_start, [ties, solved]);
+                product.make(panel, schur);
             });
-            let chunks = column_starts.len().saturating_sub(1).div_ceil(CHUNK);
-            let mut rest = &mut *values;
-            let mut parts = Vec::with_capacity(chunks);
-            for chunk in 0..chunks {
-                let (first, last) = (chunk * CHUNK, ((chunk + 1) * CHUNK).min(column_starts.len() - 1));
-                let (part, tail) = rest.split_at_mut(column_starts[last] - column_starts[first]);
-                rest = tail;
-                parts.push((first..last, part));
-            }
-            parts.into_par_iter().with_max_len(1).for_each(|(columns, part)| {
+            let start = |column: usize| [column_starts[column]];
+            for_each_part(0..column_starts.len() - 1, CHUNK, [&mut *values], &start, &|columns, [part]| {
                 let begin = column_starts[columns.start];
                 for (panel, product) in panels.iter().zip(&*batch) {
                     let place =
@@ -180,29 +176,33 @@ impl Panels {
 
 impl Product {
     /// `Wᵀ H⁻¹ W` of a panel: its lower triangle, column by column.
-    fn make(&mut self, panel: &Panel, edges: &Lists<u32>, edge_start: &[usize], [ties, solved]: [&[f64]; 2]) {
+    fn make(&mut self, panel: &Panel, schur: &Schur<'_>) {
+        let (structure, mut row) = (schur.structure, 0);
         let (rows, columns) = (panel.rows, panel.columns[panel.blocks.len()]);
-        for (all, target) in [(ties, &mut self.ties), (solved, &mut self.solved)] {
+        for target in [&mut self.ties, &mut self.solved] {
             target.clear();
             target.resize(rows * columns, 0.0);
-            let mut row = 0;
-            for member in &panel.members {
-                let member = *member as usize;
-                let mut at = 0;
-                let mut height = 0;
-                for edge in edges.start[member]..edges.start[member + 1] {
-                    while panel.blocks[at] != edges.items[edge] {
-                        at += 1;
-                    }
-                    let (first, width) = (panel.columns[at], panel.columns[at + 1] - panel.columns[at]);
-                    let block = &all[edge_start[edge]..edge_start[edge + 1]];
-                    height = block.len() / width;
+        }
+        let mut room = [0.0; MOST_TIE];
+        for member in &panel.members {
+            let member = *member as usize;
+            let (height, inverse) = (structure.eliminated_sizes[member], schur.inverse(member));
+            let mut at = 0;
+            for edge in structure.edges.start[member]..structure.edges.start[member + 1] {
+                while panel.blocks[at] != structure.edges.items[edge] {
+                    at += 1;
+                }
+                let (first, width) = (panel.columns[at], panel.columns[at + 1] - panel.columns[at]);
+                let tie = &schur.ties[structure.numbers_of(edge)];
+                let solved = &mut room[..tie.len()];
+                multiply(inverse, tie, height, width, solved);
+                for (block, target) in [(tie, &mut self.ties), (&*solved, &mut self.solved)] {
                     for (k, line) in block.chunks_exact(width).enumerate() {
                         target[(row + k) * columns + first..][..width].copy_from_slice(line);
                     }
                 }
-                row += height;
             }
+            row += height;
         }
         self.entries.resize(columns * columns, 0.0);
         // Row by row is the transposed, column by column.

@@ -39,6 +39,8 @@ pub enum Factorisation {
     Dense,
     /// By its non-zero parts, in an order with little fill.
     Sparse,
+    /// Not at all: solved by conjugate gradients, preconditioned by its diagonal blocks, as far as is worth it.
+    Iterative,
 }
 
 impl Factorisation {
@@ -49,6 +51,7 @@ impl Factorisation {
             Self::Cheapest => "cheapest",
             Self::Dense => "dense",
             Self::Sparse => "sparse",
+            Self::Iterative => "iterative",
         }
     }
 }
@@ -68,6 +71,11 @@ pub struct Choice {
     pub elimination_cost: f64,
     /// Cost of the factorisation.
     pub factorisation_cost: f64,
+    /// Iterations of conjugate gradients that cost as much: while steps need no more of them, nothing is factorised. None where that
+    /// would never be so.
+    pub iterations: usize,
+    /// Whether the cost of the factorisation is a lower bound: it is more than another way costs, and was not looked at further.
+    pub is_bound: bool,
 }
 
 impl Choice {
@@ -87,20 +95,33 @@ pub struct Plan {
     pub taken: usize,
 }
 
+impl Plan {
+    /// What was taken.
+    pub(super) fn choice(&self) -> &Choice {
+        &self.choices[self.taken]
+    }
+}
+
 impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (place, choice) in self.choices.iter().enumerate() {
             let mark = if place == self.taken { "->" } else { "  " };
-            writeln!(
+            let Choice { eliminated, reduced, iterations, elimination_cost, factorisation_cost, .. } = choice;
+            let (eliminate, millions) = (choice.eliminate.name(), |cost: f64| cost / 1e6);
+            write!(
                 f,
-                "{mark} eliminate {:<9} ({} variables), factorise {} unknowns {}: {:.1} + {:.1} million multiplications",
-                choice.eliminate.name(),
-                choice.eliminated,
-                choice.reduced,
-                choice.factorisation.name(),
-                choice.elimination_cost / 1e6,
-                choice.factorisation_cost / 1e6,
+                "{mark} eliminate {eliminate:<9} ({eliminated} variables), factorise {reduced} unknowns"
             )?;
+            if choice.is_bound {
+                write!(f, ": {:.1} + at least", millions(*elimination_cost))?;
+            } else {
+                write!(f, " {}: {:.1} +", choice.factorisation.name(), millions(*elimination_cost))?;
+            }
+            write!(f, " {:.1} million multiplications", millions(*factorisation_cost))?;
+            match iterations {
+                0 => writeln!(f)?,
+                _ => writeln!(f, ", or up to {iterations} iterations of conjugate gradients")?,
+            }
         }
         Ok(())
     }

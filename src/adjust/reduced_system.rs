@@ -2,7 +2,9 @@
 
 use super::block_pattern::BlockPattern;
 use super::error::Error;
-use faer::dyn_stack::{MemBuffer, MemStack};
+use super::parts::starts;
+use super::plan::Factorisation;
+use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::llt;
 use faer::linalg::cholesky::llt::factor::LltRegularization;
 use faer::sparse::linalg::cholesky::{
@@ -34,6 +36,8 @@ enum Storage {
     Dense { memory: MemBuffer },
     /// Only what is not zero.
     Sparse(Box<Sparse>),
+    /// No columns: the system is never made.
+    Absent,
 }
 
 struct Sparse {
@@ -46,14 +50,18 @@ struct Sparse {
 impl ReducedSystem {
     /// Makes room for a matrix of this pattern.
     ///
-    /// * `sizes` — rows of each block; `is_dense` — whether it is kept and factorised as a full matrix.
-    pub(super) fn new(pattern: BlockPattern, sizes: &[usize], is_dense: bool) -> Result<Self, Error> {
-        let mut start = vec![0];
-        for size in sizes {
-            start.push(start[start.len() - 1] + size);
-        }
+    /// * `sizes` — rows of each block; `factorisation` — whether it is a full matrix, a sparse one, or not made at all.
+    pub(super) fn new(
+        pattern: BlockPattern,
+        sizes: &[usize],
+        factorisation: Factorisation,
+    ) -> Result<Self, Error> {
+        let start = starts(sizes.iter().copied());
         let rows = start[sizes.len()];
-        if is_dense {
+        if factorisation == Factorisation::Iterative {
+            return Ok(Self { start, pattern, values: Vec::new(), storage: Storage::Absent });
+        }
+        if factorisation == Factorisation::Dense {
             if rows > MOST_DENSE {
                 return Err(Error::TooLarge { most: MOST_DENSE, found: rows });
             }
@@ -113,6 +121,7 @@ impl ReducedSystem {
             Storage::Sparse(sparse) => {
                 self.start.iter().map(|first| sparse.matrix.col_ptr()[*first] as usize).collect()
             }
+            Storage::Absent => vec![0; self.start.len()],
         }
     }
 
@@ -121,7 +130,7 @@ impl ReducedSystem {
         let below = self.pattern.below(column);
         let (first, size) = (self.start[column], self.start[column + 1] - self.start[column]);
         match &self.storage {
-            Storage::Dense { .. } => {
+            Storage::Dense { .. } | Storage::Absent => {
                 let rows = self.rows();
                 Walk {
                     system: self,
@@ -145,7 +154,7 @@ impl ReducedSystem {
     pub(super) fn places<'a>(&self, column: usize, local: &'a mut Vec<usize>) -> Places<'a> {
         local.resize(self.pattern.len(), 0);
         match &self.storage {
-            Storage::Dense { .. } => {
+            Storage::Dense { .. } | Storage::Absent => {
                 for row in self.pattern.below(column) {
                     local[*row as usize] = self.start[*row as usize];
                 }
@@ -173,6 +182,7 @@ impl ReducedSystem {
             return true;
         }
         match &mut self.storage {
+            Storage::Absent => false,
             Storage::Dense { memory } => {
                 let matrix = MatMut::from_column_major_slice_mut(&mut self.values, rows, rows);
                 let stack = MemStack::new(memory);
@@ -202,8 +212,19 @@ impl ReducedSystem {
         }
     }
 
+    /// Room for solving with some right sides at once.
+    pub(super) fn room(&self, sides: usize) -> MemBuffer {
+        MemBuffer::new(match &self.storage {
+            Storage::Absent => StackReq::EMPTY,
+            Storage::Dense { .. } => llt::solve::solve_in_place_scratch::<f64>(self.rows(), sides, PARALLEL),
+            Storage::Sparse(sparse) => sparse.symbolic.solve_in_place_scratch::<f64>(sides, PARALLEL),
+        })
+    }
+
     /// Solves with the factor for one or several right sides, column by column.
-    pub(super) fn solve(&self, sides: &mut [f64]) {
+    ///
+    /// * `room` — of [`ReducedSystem::room`] for as many sides.
+    pub(super) fn solve(&self, sides: &mut [f64], room: &mut MemBuffer) {
         let rows = self.rows();
         if rows == 0 || sides.is_empty() {
             return;
@@ -211,17 +232,14 @@ impl ReducedSystem {
         let columns = sides.len() / rows;
         let sides = MatMut::from_column_major_slice_mut(sides, rows, columns);
         match &self.storage {
+            Storage::Absent => {}
             Storage::Dense { .. } => {
                 let factor = MatRef::from_column_major_slice(&self.values, rows, rows);
-                let request = llt::solve::solve_in_place_scratch::<f64>(rows, columns, PARALLEL);
-                let mut memory = MemBuffer::new(request);
-                llt::solve::solve_in_place(factor, sides, PARALLEL, MemStack::new(&mut memory));
+                llt::solve::solve_in_place(factor, sides, PARALLEL, MemStack::new(room));
             }
             Storage::Sparse(sparse) => {
-                let request = sparse.symbolic.solve_in_place_scratch::<f64>(columns, PARALLEL);
-                let mut memory = MemBuffer::new(request);
                 let factor = LltRef::new(&sparse.symbolic, &sparse.factor);
-                factor.solve_in_place_with_conj(Conj::No, sides, PARALLEL, MemStack::new(&mut memory));
+                factor.solve_in_place_with_conj(Conj::No, sides, PARALLEL, MemStack::new(room));
             }
         }
     }

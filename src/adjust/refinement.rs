@@ -8,10 +8,6 @@ use super::problem::Problem;
 use super::settle::Settling;
 use super::subspace::Subspace;
 
-/// A step that lowers the cost by less than this part of it is near the end. Before, a step that knows the loss would go far, and leave
-/// as outliers what weights that are held bring back.
-const NEAR: f64 = 1e-3;
-
 /// Gain ratio below which the way is crooked, so that variables are to be settled.
 const CROOKED: f64 = 0.9;
 
@@ -19,41 +15,41 @@ const CROOKED: f64 = 0.9;
 pub(super) struct Refinement {
     subspace: Subspace,
     settling: Option<Settling>,
-    is_near: bool,
     /// The step with the weights held and what it promises, while a longer one is tried.
     plain: Vec<f64>,
     promise: Option<f64>,
 }
 
 impl Refinement {
-    /// The most that a settled or shortened step tells of the damping: that it is right.
+    /// The most that a shortened step tells of the damping: that it is right.
     pub(super) const CAUTIOUS: f64 = 0.5;
+
+    /// The most that a settled step tells of it: that an eighth less may do.
+    pub(super) const SETTLED: f64 = 0.75;
 
     /// For a problem with a robust loss; `None` where all are least squares.
     pub(super) fn new(problem: &Problem, equations: &NormalEquations) -> Option<Self> {
         let subspace = Subspace::new(problem, equations)?;
         let plain = vec![0.0; equations.unknowns()];
-        Some(Self { subspace, settling: None, is_near: false, plain, promise: None })
+        Some(Self { subspace, settling: None, plain, promise: None })
     }
 
     /// Makes of a step the best that is found from it; gives what it promises.
     ///
-    /// * `damping`, `promise` — of the step.
+    /// * `damping`, `promise` — of the step; `cost` — where it begins.
     pub(super) fn lengthen(
         &mut self,
         problem: &Problem,
-        equations: &NormalEquations,
+        equations: &mut NormalEquations,
         damping: f64,
+        cost: f64,
         promise: f64,
         step: &mut [f64],
     ) -> f64 {
-        self.promise = None;
-        if !self.is_near {
-            return promise;
-        }
         self.plain.copy_from_slice(step);
-        let Some(found) = self.subspace.search(problem, equations, damping, step) else {
+        let Some(found) = self.subspace.search(problem, equations, damping, cost, step) else {
             step.copy_from_slice(&self.plain);
+            self.promise = None;
             return promise;
         };
         self.promise = Some(promise);
@@ -61,8 +57,8 @@ impl Refinement {
     }
 
     /// Whether variables are to be settled after a step of this gain ratio.
-    pub(super) fn is_crooked(&self, ratio: f64) -> bool {
-        self.is_near && ratio < CROOKED
+    pub(super) fn is_crooked(ratio: f64) -> bool {
+        ratio < CROOKED
     }
 
     /// Brings variables to their own least cost, where `linear` was made and the cost is `cost`; gives the cost after.
@@ -87,7 +83,6 @@ impl Refinement {
     /// What became of a step.
     pub(super) fn learn(&mut self, tried: &Step, step: &[f64]) {
         if tried.accepted {
-            self.is_near |= tried.decrease < NEAR * tried.cost;
             self.subspace.remember(step);
         } else {
             self.subspace.forget();

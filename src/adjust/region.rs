@@ -50,6 +50,7 @@ impl Region {
         problem: &Problem,
         equations: &mut NormalEquations,
         fresh: bool,
+        is_near: bool,
         step: &mut [f64],
     ) -> Option<f64> {
         for (right, gradient) in self.right.iter_mut().zip(equations.gradient()) {
@@ -57,12 +58,11 @@ impl Region {
         }
         match self.optimiser {
             Optimiser::LevenbergMarquardt => {
-                if !equations.factorise(self.damping) {
+                if !equations.prepare(self.damping, is_near) || !equations.solve(&self.right, step) {
                     return None;
                 }
-                equations.solve(&self.right, step);
                 let parts = step.iter().zip(equations.gradient()).zip(equations.diagonal());
-                // −gᵀδ − ½ δᵀHδ with Hδ = −g − λDδ.
+                // −gᵀδ − ½ δᵀHδ with δᵀHδ = −gᵀδ − λδᵀDδ, which is so of conjugate gradients wherever they stop.
                 let promise: f64 = parts.map(|((s, g), d)| 0.5 * s * (self.damping * d * s - g)).sum();
                 (promise.is_finite() && promise > 0.0).then_some(promise)
             }

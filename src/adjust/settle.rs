@@ -4,6 +4,7 @@ use super::elimination::{Incidence, Lists, for_each_factor};
 use super::linearisation::Linearisation;
 use super::parametrisation::MOST_FREEDOM;
 use super::problem::{Problem, Values};
+use super::small_blocks::with_size;
 use nalgebra::{SMatrix, SVector, linalg::Cholesky};
 use rayon::prelude::*;
 
@@ -32,6 +33,9 @@ pub(super) struct Settling {
 struct Set {
     variables: Vec<u32>,
     shares: Lists<Share>,
+    /// A step of each variable, and whether it is kept.
+    found: Vec<Option<[f64; MOST_FREEDOM]>>,
+    keep: Vec<bool>,
 }
 
 impl Settling {
@@ -50,7 +54,7 @@ impl Settling {
         linear: &mut Linearisation,
         mut cost: f64,
     ) -> f64 {
-        for set in &self.sets {
+        for set in &mut self.sets {
             self.moved.copy_from_slice(numbers);
             set.step(problem, numbers, linear, &mut self.moved);
             let found = problem.linearise(&self.moved, linear);
@@ -87,33 +91,20 @@ impl Set {
             left -= 1;
             factor += 1;
         });
-        Self { shares: Lists::gather(variables.len(), &pairs), variables }
+        let shares = Lists::gather(variables.len(), &pairs);
+        Self { shares, variables, found: Vec::new(), keep: Vec::new() }
     }
 
     /// One step of each variable, into `moved` where it lowers its cost.
-    fn step(&self, problem: &Problem, numbers: &[f64], linear: &Linearisation, moved: &mut [f64]) {
-        let found: Vec<Option<[f64; MOST_FREEDOM]>> = (0..self.variables.len())
-            .into_par_iter()
-            .with_min_len(CHUNK)
-            .map(|at| {
-                let variable = self.variables[at] as usize;
-                let freedom = problem.spaces[problem.space_of[variable] as usize].freedom();
-                let shares = self.shares.of(at);
-                match freedom {
-                    6 => own_step::<6>(shares, linear),
-                    4 => own_step::<4>(shares, linear),
-                    3 => own_step::<3>(shares, linear),
-                    2 => own_step::<2>(shares, linear),
-                    1 => own_step::<1>(shares, linear),
-                    5 => own_step::<5>(shares, linear),
-                    7 => own_step::<7>(shares, linear),
-                    8 => own_step::<8>(shares, linear),
-                    9 => own_step::<9>(shares, linear),
-                    _ => None,
-                }
-            })
-            .collect();
-        for (variable, step) in self.variables.iter().zip(&found) {
+    fn step(&mut self, problem: &Problem, numbers: &[f64], linear: &Linearisation, moved: &mut [f64]) {
+        let Self { variables, shares, found, keep } = self;
+        let all = || (0..variables.len()).into_par_iter().with_min_len(CHUNK);
+        let step = |at: usize| {
+            let freedom = problem.spaces[problem.space_of[variables[at] as usize] as usize].freedom();
+            with_size!(freedom, own_step(shares.of(at), linear))
+        };
+        all().map(step).collect_into_vec(found);
+        for (variable, step) in variables.iter().zip(&*found) {
             let variable = *variable as usize;
             if let Some(step) = step {
                 let range = problem.start[variable]..problem.start[variable + 1];
@@ -123,24 +114,20 @@ impl Set {
         }
         let (before, after) =
             (Values { numbers, start: &problem.start }, Values { numbers: moved, start: &problem.start });
-        let keep: Vec<bool> = (0..self.variables.len())
-            .into_par_iter()
-            .with_min_len(CHUNK)
-            .map(|at| {
-                found[at].is_some() && {
-                    let cost = |values: &Values<'_>| -> Option<f64> {
-                        let mut cost = 0.0;
-                        for share in self.shares.of(at) {
-                            let batch = &problem.batches[share.batch as usize];
-                            cost += batch.loss().evaluate(batch.squared(share.factor as usize, values)?).0;
-                        }
-                        Some(cost)
-                    };
-                    matches!((cost(&before), cost(&after)), (Some(before), Some(after)) if after < before)
+        let is_better = |at: usize| {
+            let cost = |values: &Values<'_>| -> Option<f64> {
+                let mut cost = 0.0;
+                for share in shares.of(at) {
+                    let batch = &problem.batches[share.batch as usize];
+                    cost += batch.loss().evaluate(batch.squared(share.factor as usize, values)?).0;
                 }
-            })
-            .collect();
-        for (variable, keep) in self.variables.iter().zip(keep) {
+                Some(cost)
+            };
+            found[at].is_some()
+                && matches!((cost(&before), cost(&after)), (Some(before), Some(after)) if after < before)
+        };
+        all().map(is_better).collect_into_vec(keep);
+        for (variable, keep) in variables.iter().zip(&*keep) {
             if !keep {
                 let range = problem.start[*variable as usize]..problem.start[*variable as usize + 1];
                 moved[range.clone()].copy_from_slice(&numbers[range]);

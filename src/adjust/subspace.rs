@@ -3,6 +3,7 @@
 use super::loss::{Loss, LossSum};
 use super::normal_equations::NormalEquations;
 use super::problem::Problem;
+use super::small_blocks::dot;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
@@ -61,6 +62,13 @@ struct Metric {
     matrix: Matrix3<f64>,
 }
 
+impl Metric {
+    /// What damping adds at a place.
+    fn at(&self, place: &Vector3<f64>) -> f64 {
+        self.pull.dot(place) + 0.5 * place.dot(&(self.matrix * place))
+    }
+}
+
 /// Value, slope and curvature over the subspace.
 #[derive(Clone, Copy)]
 struct Model {
@@ -98,28 +106,26 @@ impl Subspace {
 
     /// Replaces a step by the best that is found from it; gives the decrease of the cost that it promises, `None` where there is none.
     ///
-    /// * `damping` — λ, by which the step was found.
+    /// * `damping` — λ, by which the step was found; `cost` — where it begins.
     pub(super) fn search(
         &mut self,
         problem: &Problem,
-        equations: &NormalEquations,
+        equations: &mut NormalEquations,
         damping: f64,
+        cost: f64,
         step: &mut [f64],
     ) -> Option<f64> {
-        let diagonal = equations.diagonal();
         self.begin(problem, equations);
         self.directions[0].copy_from_slice(step);
         for (direction, taken) in self.directions[1..].iter_mut().zip(&self.taken) {
             direction.copy_from_slice(taken);
         }
         let mut count = 1 + self.taken.len();
-        for direction in 0..count {
-            self.change(problem, equations, direction);
-        }
+        self.change(problem, equations, count);
         self.total.fill(0.0);
-        let mut gained = 0.0;
+        let (mut cost, mut gained) = (cost, 0.0);
         for round in 1.. {
-            let (place, gain) = self.best(problem, equations, damping, count);
+            let (place, gain) = self.best(problem, equations, damping, count, &mut cost);
             gained += gain;
             // What was found is the second direction of the next round, the second one its third.
             let [new, last, before] = &mut self.directions;
@@ -141,24 +147,29 @@ impl Subspace {
                 break;
             }
             self.slope(problem, equations);
-            for ((slope, total), d) in self.slope.iter_mut().zip(&self.total).zip(diagonal) {
+            for ((slope, total), d) in self.slope.iter_mut().zip(&self.total).zip(equations.diagonal()) {
                 *slope -= damping * d * total;
             }
-            equations.solve(&self.slope, &mut self.directions[0]);
-            self.change(problem, equations, 0);
+            if !equations.solve(&self.slope, &mut self.directions[0]) {
+                break;
+            }
+            self.change(problem, equations, 1);
             count = (count + 1).min(MOST);
         }
         step.copy_from_slice(&self.total);
         (gained.is_finite() && gained > 0.0).then_some(gained)
     }
 
-    /// The best place of the subspace, and how far it lowers the cost.
+    /// The best place of the subspace, and how far it lowers the cost and what damping adds.
+    ///
+    /// * `cost` — where it begins without what damping adds, and then at the best place.
     fn best(
         &self,
         problem: &Problem,
         equations: &NormalEquations,
         damping: f64,
         count: usize,
+        cost: &mut f64,
     ) -> (Vector3<f64>, f64) {
         let diagonal = equations.diagonal();
         let product = |a: &[f64], b: &[f64]| -> f64 {
@@ -173,16 +184,17 @@ impl Subspace {
                 metric.matrix[(column, row)] = product;
             }
         }
-        let start = self.model(problem, equations, &metric, &Vector3::zeros());
+        let start = *cost;
         // With the weights held the whole of the first direction lowers the cost; what is found is no worse.
         let mut place = Vector3::x();
         let mut here = self.model(problem, equations, &metric, &place);
-        if here.cost.is_nan() || here.cost > start.cost {
-            (place, here) = (Vector3::zeros(), start);
+        if here.cost.is_nan() || here.cost > start {
+            place = Vector3::zeros();
+            here = self.model(problem, equations, &metric, &place);
         }
         for _ in 0..MOST_STEPS {
             let Some(mut shift) = here.shift(count) else { break };
-            if -0.5 * here.gradient.dot(&shift) <= LEAST_GAIN * (start.cost - here.cost) {
+            if -0.5 * here.gradient.dot(&shift) <= LEAST_GAIN * (start - here.cost) {
                 break;
             }
             let mut there = self.model(problem, equations, &metric, &(place + shift));
@@ -198,7 +210,8 @@ impl Subspace {
             place += shift;
             here = there;
         }
-        (place, start.cost - here.cost)
+        *cost = here.cost - metric.at(&place);
+        (place, start - here.cost)
     }
 
     /// A step that was taken is a direction of the next search.
@@ -230,11 +243,10 @@ impl Subspace {
         }
     }
 
-    /// `J v` of one direction.
-    fn change(&mut self, problem: &Problem, equations: &NormalEquations, place: usize) {
+    /// `J v` of the first directions.
+    fn change(&mut self, problem: &Problem, equations: &NormalEquations, count: usize) {
         let Self { batches, step_of, directions, changes, .. } = self;
-        let linear = &equations.linear;
-        let direction = &directions[place];
+        let (linear, directions) = (&equations.linear, &directions[..count]);
         let mut changes = &mut changes[..];
         for (shape, layout) in batches.iter().zip(&problem.layout.batches) {
             let factors = layout.factors();
@@ -243,7 +255,7 @@ impl Subspace {
             mine.par_chunks_mut(CHUNK * layout.rows).enumerate().for_each(|(chunk, changes)| {
                 for (index, lines) in changes.chunks_exact_mut(layout.rows).enumerate() {
                     let factor = chunk * CHUNK + index;
-                    lines.iter_mut().for_each(|line| line[place] = 0.0);
+                    lines.iter_mut().for_each(|line| line[..count].fill(0.0));
                     let root = linear.roots[layout.factor_start + factor];
                     if root == 0.0 {
                         continue;
@@ -254,15 +266,19 @@ impl Subspace {
                     let mut column = 0;
                     for (variable, freedom) in variables.iter().zip(&shape.freedoms) {
                         if let Some(begin) = step_of[variable.index()] {
-                            let direction = &direction[begin as usize..begin as usize + freedom];
-                            for (row, line) in lines.iter_mut().enumerate() {
-                                let entries = &jacobian[row * layout.columns + column..];
-                                line[place] += direction.iter().zip(entries).map(|(d, j)| d * j).sum::<f64>();
+                            for (place, direction) in directions.iter().enumerate() {
+                                let moved = &direction[begin as usize..begin as usize + freedom];
+                                for (line, entries) in
+                                    lines.iter_mut().zip(jacobian.chunks_exact(layout.columns))
+                                {
+                                    line[place] += dot(moved, &entries[column..column + freedom]);
+                                }
                             }
                         }
                         column += freedom;
                     }
-                    lines.iter_mut().for_each(|line| line[place] /= root);
+                    let scale = 1.0 / root;
+                    lines.iter_mut().flat_map(|line| &mut line[..count]).for_each(|change| *change *= scale);
                 }
             });
         }
@@ -300,7 +316,7 @@ impl Subspace {
     ) -> Model {
         let pull = metric.matrix * place;
         let mut model = Model {
-            cost: metric.pull.dot(place) + 0.5 * place.dot(&pull),
+            cost: metric.at(place),
             gradient: metric.pull + pull,
             hessian: metric.matrix,
             majorant: metric.matrix,
@@ -357,7 +373,7 @@ impl Subspace {
             }
             let weight = sum.add(squared);
             // ρ' JᵀJ + 2 ρ'' Jᵀr rᵀJ
-            let bend = if squared > 0.0 { weight * (loss.stiffness(squared) - 1.0) / squared } else { 0.0 };
+            let bend = loss.bend(squared, weight);
             let s = slope;
             let slopes = [s[0] * s[0], s[1] * s[0], s[1] * s[1], s[2] * s[0], s[2] * s[1], s[2] * s[2]];
             for k in 0..6 {
@@ -483,7 +499,7 @@ mod tests {
             let mut step = vec![0.0; right.len()];
             equations.solve(&right, &mut step);
             // Where the problem is linear, so is the cost of a step, but for what damping adds.
-            let objective = |step: &[f64]| {
+            let objective = |equations: &NormalEquations, step: &[f64]| {
                 let mut moved = problem.numbers.clone();
                 for variable in 0..problem.len() {
                     let range = problem.start[variable]..problem.start[variable + 1];
@@ -493,11 +509,11 @@ mod tests {
                 let damped = step.iter().zip(equations.diagonal()).map(|(s, d)| s * s * d).sum::<f64>();
                 problem.cost_at(&moved) + 0.5 * damping * damped
             };
-            let plain = objective(&step);
+            let plain = objective(&equations, &step);
             let mut subspace = Subspace::new(&problem, &equations).unwrap();
             let mut longer = step.clone();
-            let promise = subspace.search(&problem, &equations, damping, &mut longer).unwrap();
-            let found = objective(&longer);
+            let promise = subspace.search(&problem, &mut equations, damping, cost, &mut longer).unwrap();
+            let found = objective(&equations, &longer);
             prop_assert!((cost - promise - found).abs() <= 1e-9 * cost, "{cost} - {promise} is not {found}");
             prop_assert!(found <= plain + 1e-9 * cost, "{found} is over {plain}");
         }

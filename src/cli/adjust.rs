@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::io::{self, Write};
 use std::path::PathBuf;
+use std::time::{Duration, Instant};
 
 use anyhow::Context;
 
@@ -172,6 +173,8 @@ enum FactoriseName {
     Dense,
     /// By its non-zero parts.
     Sparse,
+    /// Not at all: it is solved by conjugate gradients.
+    Iterative,
 }
 
 impl Args {
@@ -245,6 +248,7 @@ impl Args {
             factorisation: match self.factorise {
                 Some(FactoriseName::Dense) => Factorisation::Dense,
                 Some(FactoriseName::Sparse) => Factorisation::Sparse,
+                Some(FactoriseName::Iterative) => Factorisation::Iterative,
                 None => Factorisation::Cheapest,
             },
             ..usual
@@ -271,26 +275,28 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     let options = args.options(Method::default());
     let name = options.estimate_name().to_owned();
     extended::check_name("an estimate", &name, Estimate::is_in(&sequence, &name), args.replace)?;
-    let graph = pick(args.graph.as_deref(), &sequence)?;
+    let graph = pick(args.graph.as_deref(), &mut sequence)?;
     if args.graph.is_none() {
         writeln!(io::stderr(), "adjusting the graph `{}`", graph.name)?;
     }
-    let adjusted = args.watched(|watch| adjust_watched(&graph, &options, watch))?;
-    let Adjusted { estimate, summary } = adjusted;
+    let (Adjusted { estimate, summary }, took) =
+        args.watched(|watch| adjust_watched(&graph, &options, watch))?;
     outcome = args.outcome(&summary, outcome)?;
+    let graph_name = graph.name.clone();
+    graph.put(&mut sequence);
     estimate.put(&mut sequence);
     sequence.sort();
     let size = extended::write(&args.output, sequence, args.force)?;
-    args.tell(&graph.name, &name, &summary, &size, stdout)?;
+    args.tell([&graph_name, &name], &summary, took, &size, stdout)?;
     Ok(outcome)
 }
 
 impl Args {
-    /// Adjusts on the threads that are asked for, with a progress bar.
+    /// Adjusts on the threads that are asked for, with a progress bar; gives the estimate and how long it took.
     pub(super) fn watched<T: Send>(
         &self,
         adjust: impl FnOnce(&mut dyn FnMut(&Step) -> bool) -> Result<T, Error> + Send,
-    ) -> anyhow::Result<T> {
+    ) -> anyhow::Result<(T, Duration)> {
         let progress = Progress::new("adjusting", "steps");
         let most = self.solver(SolverOptions::default()).max_iterations as u64;
         let mut done = 0;
@@ -301,11 +307,12 @@ impl Args {
                 true
             })
         };
+        let start = Instant::now();
         let adjusted = match self.threads {
             Some(threads) => rayon::ThreadPoolBuilder::new().num_threads(threads).build()?.install(run),
             None => run(),
         };
-        Ok(adjusted?)
+        Ok((adjusted?, start.elapsed()))
     }
 
     /// Says the plan where it is asked for, and what is left to be desired.
@@ -325,16 +332,18 @@ impl Args {
     }
 
     /// Prints how it went.
+    ///
+    /// * `took` — without reading and writing.
     pub(super) fn tell(
         &self,
-        graph: &str,
-        name: &str,
+        [graph, name]: [&str; 2],
         summary: &Summary,
+        took: Duration,
         size: &str,
         stdout: &mut dyn Write,
     ) -> anyhow::Result<()> {
         if self.json {
-            serde_json::to_writer_pretty(&mut *stdout, &as_json(graph, name, summary))?;
+            serde_json::to_writer_pretty(&mut *stdout, &as_json(graph, name, summary, took))?;
             writeln!(stdout)?;
         } else {
             write!(stdout, "{}", as_text(graph, name, summary))?;
@@ -344,13 +353,13 @@ impl Args {
     }
 }
 
-/// The graph of a name, or the one that is meant where none is given.
-fn pick(name: Option<&str>, sequence: &Sequence) -> anyhow::Result<FactorGraph> {
+/// Takes the graph of a name, or the one that is meant where none is given, out of a sequence.
+fn pick(name: Option<&str>, sequence: &mut Sequence) -> anyhow::Result<FactorGraph> {
     let names = FactorGraph::names(sequence);
     let list = |names: &BTreeSet<String>| names.iter().cloned().collect::<Vec<_>>().join(", ");
     if let Some(name) = name {
         let known = || format!("no graph `{name}`; there are: {}", list(&names));
-        return FactorGraph::of(sequence, name).with_context(known);
+        return FactorGraph::take(sequence, name).with_context(known);
     }
     let usual = ["initial", "map-to-frame", "frame-to-frame"];
     let picked = match names.len() {
@@ -359,5 +368,5 @@ fn pick(name: Option<&str>, sequence: &Sequence) -> anyhow::Result<FactorGraph> 
         _ => usual.into_iter().find(|name| names.contains(*name)),
     };
     let picked = picked.with_context(|| format!("which graph? --graph takes one of: {}", list(&names)))?;
-    FactorGraph::of(sequence, picked).context("the graph is empty")
+    FactorGraph::take(sequence, picked).context("the graph is empty")
 }

@@ -126,8 +126,8 @@ fn run_g2o(args: &Args, as_file: bool, stdout: &mut dyn Write) -> anyhow::Result
         let (count, method) = (text::count(idle_count as u64), options.method.name());
         writeln!(io::stderr(), "note: {count} {} have no part in the method {method}", idle.0)?;
     }
-    let adjusted = args.watched(|watch| adjust_watched(&graph, &options, watch))?;
-    let Adjusted { estimate, summary } = adjusted;
+    let (Adjusted { estimate, summary }, took) =
+        args.watched(|watch| adjust_watched(&graph, &options, watch))?;
     let outcome = args.outcome(&summary, outcome)?;
     let size = if as_file {
         let moved = with_estimate(&model, &estimate);
@@ -137,7 +137,7 @@ fn run_g2o(args: &Args, as_file: bool, stdout: &mut dyn Write) -> anyhow::Result
         estimate.put(&mut sequence);
         write(args, sequence)?
     };
-    args.tell(GRAPH, options.estimate_name(), &summary, &size, stdout)?;
+    args.tell([GRAPH, options.estimate_name()], &summary, took, &size, stdout)?;
     Ok(outcome)
 }
 
@@ -154,7 +154,7 @@ fn run_bal(args: &Args, as_file: bool, stdout: &mut dyn Write) -> anyhow::Result
             .collect(),
     };
     let (loss, solver) = (args.loss.unwrap_or(Loss::None), args.solver(SolverOptions::default()));
-    let adjusted = args.watched(|watch| adjust_bal(&bundle, loss, &solver, watch))?;
+    let (adjusted, took) = args.watched(|watch| adjust_bal(&bundle, loss, &solver, watch))?;
     let BalAdjusted { cameras, points, steps, summary } = adjusted;
     let mut outcome = args.outcome(&summary, Outcome::Done)?;
     let cameras = cameras.into_iter().map(BalCamera::from_numbers).collect();
@@ -179,7 +179,7 @@ fn run_bal(args: &Args, as_file: bool, stdout: &mut dyn Write) -> anyhow::Result
         estimate.put(&mut sequence);
         write(args, sequence)?
     };
-    args.tell(GRAPH, estimate_name, &summary, &size, stdout)?;
+    args.tell([GRAPH, estimate_name], &summary, took, &size, stdout)?;
     Ok(outcome)
 }
 

@@ -1,5 +1,7 @@
 //! How an adjustment went, for people and as JSON.
 
+use std::time::Duration;
+
 use serde_json::json;
 
 use super::text;
@@ -76,7 +78,8 @@ fn tallies(summary: &Summary) -> [(&'static str, &Tally); 6] {
     ]
 }
 
-pub(super) fn as_json(graph: &str, name: &str, summary: &Summary) -> serde_json::Value {
+/// * `took` — the adjustment alone, without reading and writing.
+pub(super) fn as_json(graph: &str, name: &str, summary: &Summary, took: Duration) -> serde_json::Value {
     let tally = |tally: &Tally| {
         let excluded: serde_json::Map<_, _> =
             tally.excluded.iter().map(|(reason, count)| (reason.words().to_owned(), json!(count))).collect();
@@ -89,6 +92,7 @@ pub(super) fn as_json(graph: &str, name: &str, summary: &Summary) -> serde_json:
         "ending": summary.ending.words(),
         "converged": summary.ending.has_converged(),
         "iterations": summary.iterations,
+        "seconds": took.as_secs_f64(),
         "initial_cost": summary.initial_cost,
         "final_cost": summary.final_cost,
         "residual_rms_sigma": summary.residual_rms,

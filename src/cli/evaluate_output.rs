@@ -38,19 +38,7 @@ impl OutputArgs {
     /// Refuses outputs that are an input, or lie in one.
     pub(super) fn refuse_inputs(&self, inputs: &[PathBuf]) -> anyhow::Result<()> {
         let outputs = [&self.per_frame, &self.save_plot, &self.save_results, &self.save_relative_results];
-        for output in outputs.into_iter().flatten() {
-            let folder = output.parent().filter(|folder| !folder.as_os_str().is_empty());
-            let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok();
-            let place = folder.zip(output.file_name()).map(|(folder, name)| folder.join(name));
-            let taken = |input: &PathBuf| {
-                let input = input.canonicalize().ok();
-                input.zip(place.as_ref()).is_some_and(|(input, place)| place.starts_with(input))
-            };
-            if inputs.iter().any(taken) {
-                anyhow::bail!("{}: is an input itself, or lies in one", output.display());
-            }
-        }
-        Ok(())
+        outputs.into_iter().flatten().try_for_each(|output| refuse_input(output, inputs))
     }
 
     /// Writes what was asked for.
@@ -98,6 +86,21 @@ impl OutputArgs {
         fs::write(partial.path(), bytes).with_context(|| path.display().to_string())?;
         Ok(partial.finish()?)
     }
+}
+
+/// Refuses an output that is an input, or lies in one.
+pub(super) fn refuse_input(output: &Path, inputs: &[PathBuf]) -> anyhow::Result<()> {
+    let folder = output.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok();
+    let place = folder.zip(output.file_name()).map(|(folder, name)| folder.join(name));
+    let taken = |input: &PathBuf| {
+        let input = input.canonicalize().ok();
+        input.zip(place.as_ref()).is_some_and(|(input, place)| place.starts_with(input))
+    };
+    if inputs.iter().any(taken) {
+        anyhow::bail!("{}: is an input itself, or lies in one", output.display());
+    }
+    Ok(())
 }
 
 fn expect_extension(path: &Path, expected: &str) -> anyhow::Result<()> {

@@ -1,4 +1,4 @@
-//! `os export`: a sequence's graph, paths or measurements in the formats of other programs.
+//! `os export`: a sequence's graph, paths or measurements in the formats of other programs, all of it in that of a viewer.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
@@ -16,7 +16,7 @@ use crate::exchange::{
 use crate::format::{self, Partial};
 use crate::structure::{FactorGraph, Sequence, TrajectoryFormat, write_trajectory};
 
-/// Export a graph, a path or the measurements of a sequence in the format of another program.
+/// Export a graph, a path or the measurements of a sequence in the format of another program, or everything for a viewer.
 ///
 /// What the format cannot say is told on stderr; the exit code is 3 where something is lost. Numbers keep all their
 /// digits.
@@ -30,13 +30,15 @@ use crate::structure::{FactorGraph, Sequence, TrajectoryFormat, write_trajectory
   euroc         a path: CSV with stamps in nanoseconds, world_from_camera
   text-release  the text files of the first release, a folder
   csv           measurements as CSV with cameras.json, a folder; no truth unless --with-truth
+  rerun         everything on the timeline of the Rerun viewer, FILE.rrd
 
 Examples:
   os export box1 --to g2o -o box1.g2o
   os export box1 --to colmap --estimate point-ba -o box1-colmap
   os export box1 --to tum --estimate map-to-frame -o map-to-frame.txt
   os export box1 --to tum --estimate truth -o truth.txt
-  os export box1 --to csv -o box1-csv")]
+  os export box1 --to csv -o box1-csv
+  os export box1 --to rerun -o box1.rrd")]
 pub(super) struct Args {
     /// Sequence: an MCAP file or a Parquet folder.
     sequence: PathBuf,
@@ -73,6 +75,7 @@ enum Format {
     Euroc,
     TextRelease,
     Csv,
+    Rerun,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -95,7 +98,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     let given = [("--graph", args.graph.is_some()), ("--estimate", args.estimate.is_some())];
     let takes = match args.to {
         Format::Tum | Format::Kitti | Format::Euroc => &["--estimate"][..],
-        Format::Csv => &[],
+        Format::Csv | Format::Rerun => &[],
         Format::TextRelease => &["--graph"],
         Format::G2o | Format::Bal | Format::Colmap => &["--graph", "--estimate"],
     };
@@ -184,6 +187,11 @@ fn write(args: &Args, sequence: &Sequence, partial: &Partial) -> anyhow::Result<
             let files = to_csv(sequence, args.with_truth)?;
             into_folder(partial, &files)?;
             Ok((Vec::new(), format!("{} files", files.len())))
+        }
+        Format::Rerun => {
+            let counts = format::write_rerun(partial.path(), sequence)?;
+            let what = format!("{} entities, {} frames", counts.entities, text::count(counts.frames as u64));
+            Ok((Vec::new(), what))
         }
     }
 }

@@ -28,8 +28,12 @@ mod man;
 mod measure;
 mod parsed;
 mod plot;
+mod plot_compared;
+mod plot_figures;
+mod plot_options;
 mod progress;
 mod render;
+mod report;
 mod schema;
 mod simulate;
 mod stats;
@@ -75,6 +79,7 @@ enum Command {
     Stats(stats::Args),
     Evaluate(evaluate::Args),
     Plot(plot::Args),
+    Report(report::Args),
     Schema(schema::Args),
     Export(export::Args),
     Import(import::Args),
@@ -120,6 +125,7 @@ pub fn main() -> ExitCode {
         Command::Benchmark(args) => benchmark::run(args, &mut stdout),
         Command::Adjust(args) => adjust::run(args, &mut stdout),
         Command::Plot(args) => plot::run(args, &mut stdout),
+        Command::Report(args) => report::run(args, &mut stdout),
         Command::Stats(args) => stats::run(args, &mut stdout),
         Command::Schema(args) => schema::run(args, &mut stdout),
         Command::Export(args) => export::run(args, &mut stdout),

@@ -74,11 +74,16 @@ pub(super) struct Stages {
 }
 
 impl Stages {
-    /// Tells how far a stage is; one that is new ends the one before.
+    /// Tells how far a stage is, in frames; one that is new ends the one before.
     pub(super) fn update(&self, stage: &'static str, done: u64, total: u64) {
+        self.update_in(stage, "frames", done, total);
+    }
+
+    /// As [`update`](Self::update), counted in another unit.
+    pub(super) fn update_in(&self, stage: &'static str, unit: &'static str, done: u64, total: u64) {
         let Ok(mut current) = self.stage.lock() else { return };
         if current.as_ref().is_none_or(|(name, _)| *name != stage) {
-            *current = Some((stage, Progress::new(stage, "frames")));
+            *current = Some((stage, Progress::new(stage, unit)));
         }
         if let Some((_, progress)) = current.as_ref() {
             progress.update(done, total);

@@ -10,7 +10,7 @@ use serde_json::Value;
 use super::chart::chart;
 use super::progress::Progress;
 use super::{Outcome, text};
-use crate::format::{self, SequenceReader};
+use crate::format;
 use crate::statistics::{
     Analysed, Analysis, Counted, Difference, Distribution, FeatureStatistics, SequenceStatistics,
 };
@@ -95,8 +95,8 @@ pub(super) fn analyse(path: &Path) -> anyhow::Result<Analysed> {
     let reader = format::open(path)?;
     let groups = reader.table::<StructuralGroup>()?;
     let counted = Counted {
-        measured_points: has_rows::<PointMeasurement>(&reader)?,
-        measured_lines: has_rows::<LineMeasurement>(&reader)?,
+        measured_points: reader.has_rows::<PointMeasurement>()?,
+        measured_lines: reader.has_rows::<LineMeasurement>()?,
     };
     let mut analysis = Analysis::new(reader.manifest(), &groups, counted);
     let total = reader.frame_list()?.len() as u64;
@@ -106,19 +106,6 @@ pub(super) fn analyse(path: &Path) -> anyhow::Result<Analysed> {
         progress.update(done, total);
     }
     Ok(analysis.finish())
-}
-
-/// Whether a table has a row, whatever is claimed of it.
-fn has_rows<R: Record>(reader: &SequenceReader) -> anyhow::Result<bool> {
-    if !reader.has::<R>() {
-        return Ok(false);
-    }
-    for batch in reader.batches::<R>()? {
-        if !batch?.is_empty() {
-            return Ok(true);
-        }
-    }
-    Ok(false)
 }
 
 fn one(analysed: &Analysed, out: &mut dyn Write) -> anyhow::Result<()> {

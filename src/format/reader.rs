@@ -197,6 +197,22 @@ impl SequenceReader {
         }
     }
 
+    /// Whether a table has a row, whatever is claimed of it.
+    ///
+    /// # Errors
+    /// As [`table`](Self::table).
+    pub fn has_rows<R: Record>(&self) -> Result<bool, Error> {
+        if !self.has::<R>() {
+            return Ok(false);
+        }
+        for batch in self.batches::<R>()? {
+            if !batch?.is_empty() {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
     /// Files or topics that are not of this version of the specification.
     #[must_use]
     pub fn passed_over(&self) -> &[String] {

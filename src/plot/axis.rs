@@ -50,6 +50,11 @@ impl Axis {
         Self { low, high, logarithmic: true }
     }
 
+    /// The numbers at both ends; exponents where the axis is over powers of ten.
+    pub(super) fn ends(&self) -> [f64; 2] {
+        [self.low, self.high]
+    }
+
     /// The axis with some room at both ends.
     pub(super) fn with_room(self, part: f64) -> Self {
         let room = (self.high - self.low) * part;
@@ -72,18 +77,36 @@ impl Axis {
 
     /// Round numbers along the axis, about five.
     pub(super) fn ticks(&self) -> Vec<Tick> {
-        if self.logarithmic { self.powers() } else { linear_ticks(self.low, self.high) }
+        self.ticks_about(6.0)
     }
 
-    fn powers(&self) -> Vec<Tick> {
+    /// Round numbers along the axis, which part it into at most so many parts, or twice as many over a few powers of ten.
+    pub(super) fn ticks_about(&self, parts: f64) -> Vec<Tick> {
+        if self.logarithmic { self.powers(parts) } else { linear_ticks(self.low, self.high, parts) }
+    }
+
+    /// The whole multiples of powers of ten between the ticks of a logarithmic axis over a few powers.
+    pub(super) fn minor_ticks(&self) -> Vec<f64> {
+        if !self.logarithmic || !(0.7..=6.0).contains(&(self.high - self.low)) {
+            return Vec::new();
+        }
+        let (mut exponent, mut ticks) = (self.low.floor(), Vec::new());
+        while exponent <= self.high {
+            ticks.extend((2..10).map(|part| f64::from(part) * libm::pow(10.0, exponent)));
+            exponent += 1.0;
+        }
+        ticks
+    }
+
+    fn powers(&self, about: f64) -> Vec<Tick> {
         let decades = self.high - self.low;
         if decades < 0.7 {
             let bound = |exponent: f64| libm::pow(10.0, exponent);
-            let mut ticks = linear_ticks(bound(self.low), bound(self.high));
+            let mut ticks = linear_ticks(bound(self.low), bound(self.high), about);
             ticks.retain(|tick| tick.number > 0.0);
             return ticks;
         }
-        let every = (decades / 6.0).ceil().max(1.0);
+        let every = (decades / about).ceil().max(1.0);
         let parts: &[f64] = if decades < 2.5 { &[1.0, 2.0, 5.0] } else { &[1.0] };
         let mut ticks = Vec::new();
         let mut exponent = (self.low / every).floor() * every;
@@ -100,8 +123,8 @@ impl Axis {
     }
 }
 
-fn linear_ticks(low: f64, high: f64) -> Vec<Tick> {
-    let step = round_step((high - low) / 6.0);
+fn linear_ticks(low: f64, high: f64, parts: f64) -> Vec<Tick> {
+    let step = round_step((high - low) / parts);
     let first = (low / step - 1e-9).ceil();
     (0..12)
         .map(|index| (first + f64::from(index)) * step)

@@ -1,13 +1,16 @@
-//! Pictures of sequences, as SVG: a scene with its trajectory, statistics over frames, errors of estimates, convergence.
+//! Pictures of sequences: charts for pages and reports as SVG, and figures for papers as SVG, PDF and PNG in [`paper`].
 
 mod axis;
 mod chart;
 mod curves_figure;
 mod error;
 mod evaluation_figure;
+mod growth_figure;
 mod heat;
+mod page_chart;
+pub mod paper;
 mod scene;
-mod statistics_figure;
+mod scene_shapes;
 mod svg;
 mod trajectory_figure;
 mod view;
@@ -15,10 +18,11 @@ mod view;
 pub use curves_figure::{ErrorCurve, NamedNumbers, convergence_figure, error_figure, histogram_figure};
 pub use error::Error;
 pub use evaluation_figure::{EvaluatedEstimate, evaluation_figure};
+pub use growth_figure::{Growth, growth_figure};
+pub use page_chart::{PageBars, PageCurve, Upward, page_bars, page_chart};
 pub use scene::{Scene, scene_picture};
-pub use statistics_figure::statistics_figure;
-pub use trajectory_figure::{ComparedPath, trajectory_figure};
-pub use view::{ViewFrom, upward};
+pub use trajectory_figure::{ComparedPath, LengthUnit, trajectory_figure};
+pub use view::{Plane, ViewFrom, upward};
 
 /// Background, so that a picture is readable on a dark page too.
 const PAPER: &str = "#ffffff";

@@ -2,28 +2,28 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 
+use super::chart::Area;
 use super::error::Error;
+use super::scene_shapes::{Fit, Shapes, metres_in_words, ranked, round_length};
 use super::svg::Svg;
 use super::view::{Plane, ViewFrom, upward};
 use super::{COLOURS, FAINT, INK, PAPER, QUIET};
-use crate::structure::{Frame, GroupId, LineId, LineLandmark, Manifest, PointLandmark, StructuralGroup};
+use crate::structure::{Frame, GroupId, LineLandmark, Manifest, PointLandmark, StructuralGroup};
 
 const WIDTH: f64 = 1200.0;
 const HEIGHT: f64 = 800.0;
 /// Free on each side, and above for the title.
 const MARGIN: f64 = 40.0;
 const HEAD: f64 = 96.0;
-/// Most points, lines and places of the path that are drawn: what is drawn keeps its shape, the file stays small.
-const MOST_POINTS: usize = 20_000;
-const MOST_LINES: usize = 10_000;
-const MOST_PLACES: usize = 4000;
-/// Cameras that are drawn along the path.
-const CAMERAS: usize = 14;
-/// Farther outside than this a shape is left out, units of the picture.
-const FARTHEST: f64 = 1e4;
-
+/// Where the scene stands.
+const ROOM: Area = Area {
+    left: MARGIN,
+    top: HEAD + MARGIN,
+    width: WIDTH - 2.0 * MARGIN,
+    height: HEIGHT - HEAD - 2.0 * MARGIN,
+};
 /// What is drawn of a sequence.
 #[derive(Clone, Copy, Debug)]
 pub struct Scene<'a> {
@@ -41,15 +41,6 @@ pub struct Scene<'a> {
     pub edges: &'a [[Point3<f64>; 2]],
 }
 
-/// The shapes of a scene in the plane of the picture, metres.
-struct Shapes {
-    dots: Vec<[f64; 2]>,
-    lines: Vec<(LineId, [[f64; 2]; 2])>,
-    edges: Vec<[[f64; 2]; 2]>,
-    path: Vec<[f64; 2]>,
-    axes: [[f64; 2]; 3],
-}
-
 /// A picture of a scene: points, lines in the colours of their groups, the path of the camera with some cameras, the axes of the world
 /// and a scale, seen with parallel rays.
 ///
@@ -61,8 +52,8 @@ struct Shapes {
 pub fn scene_picture(scene: &Scene<'_>, view: ViewFrom) -> Result<String, Error> {
     let manifest = scene.manifest;
     let plane = Plane::new(view, upward(&manifest.cameras, scene.frames))?;
-    let shapes = shapes(scene, &plane);
-    let fit = Fit::new(&shapes).ok_or_else(|| Error::Nothing { name: manifest.name.clone() })?;
+    let shapes = Shapes::of(scene, &plane);
+    let fit = Fit::new(&shapes, ROOM).ok_or_else(|| Error::Nothing { name: manifest.name.clone() })?;
     let mut svg = Svg::new(WIDTH, HEIGHT, PAPER, &format!("Scene and trajectory of {}", manifest.name));
     svg.element(&format!(
         "<clipPath id=\"c\"><rect y=\"{0}\" width=\"{WIDTH}\" height=\"{1}\"/></clipPath><g clip-path=\"url(#c)\">",
@@ -78,76 +69,14 @@ pub fn scene_picture(scene: &Scene<'_>, view: ViewFrom) -> Result<String, Error>
     let colours = lines(&mut svg, scene, &shapes, &fit);
     let path: Vec<[f64; 2]> = shapes.path.iter().filter_map(|place| fit.place(*place)).collect();
     svg.strokes(std::iter::once(path.as_slice()), 2.0, INK, 0.9);
-    cameras(&mut svg, scene, &shapes, &plane, &fit);
+    let cameras = shapes.camera_strokes(&fit, [16.0, 46.0]);
+    svg.strokes(cameras.iter().map(Vec::as_slice), 1.3, INK, 0.75);
     ends(&mut svg, &path);
     svg.element("</g>");
     words(&mut svg, scene, &colours);
     axes(&mut svg, &shapes);
     scale(&mut svg, &fit);
     Ok(svg.finish())
-}
-
-/// Every n-th of a list, so that at most `most` are left.
-fn thinned<T>(list: &[T], most: usize) -> impl Iterator<Item = &T> {
-    list.iter().step_by(list.len().div_ceil(most).max(1))
-}
-
-fn shapes(scene: &Scene<'_>, plane: &Plane) -> Shapes {
-    let points = thinned(scene.points, MOST_POINTS);
-    let lines = thinned(scene.lines, MOST_LINES);
-    let poses = thinned(scene.frames, MOST_PLACES).filter_map(Frame::world_from_camera);
-    Shapes {
-        dots: points.filter_map(|point| plane.place(Vector3::new(point.x, point.y, point.z))).collect(),
-        lines: lines
-            .filter_map(|line| {
-                let start = plane.place(Vector3::new(line.start_x, line.start_y, line.start_z))?;
-                let end = plane.place(Vector3::new(line.end_x, line.end_y, line.end_z))?;
-                Some((line.line_id, [start, end]))
-            })
-            .collect(),
-        edges: thinned(scene.edges, MOST_LINES)
-            .filter_map(|[start, end]| Some([plane.place(start.coords)?, plane.place(end.coords)?]))
-            .collect(),
-        path: poses.filter_map(|pose| plane.place(Vector3::from(pose.translation))).collect(),
-        axes: [0, 1, 2].map(|axis| [plane.right[axis], plane.up[axis]]),
-    }
-}
-
-/// The way from the plane to the picture.
-struct Fit {
-    middle: [f64; 2],
-    /// Units of the picture for a metre.
-    scale: f64,
-}
-
-impl Fit {
-    /// `None` when there is nothing to fit.
-    fn new(shapes: &Shapes) -> Option<Self> {
-        let mut bounds = [[0.0; 2]; 2];
-        for axis in 0..2 {
-            let mut dots: Vec<f64> = shapes.dots.iter().map(|dot| dot[axis]).collect();
-            dots.sort_unstable_by(f64::total_cmp);
-            let stray = dots.len() / 200;
-            let inner = dots.get(stray..dots.len() - stray).unwrap_or_default();
-            let ends =
-                shapes.lines.iter().flat_map(|(_, ends)| ends).chain(&shapes.path).map(|place| place[axis]);
-            let all = || inner.first().into_iter().chain(inner.last()).copied().chain(ends.clone());
-            let (low, high) = (all().min_by(f64::total_cmp)?, all().max_by(f64::total_cmp)?);
-            bounds[axis] = [low, high];
-        }
-        let room = [WIDTH - 2.0 * MARGIN, HEIGHT - HEAD - 2.0 * MARGIN];
-        let scale =
-            (0..2).map(|axis| room[axis] / (bounds[axis][1] - bounds[axis][0])).fold(f64::MAX, f64::min);
-        let scale = if scale.is_finite() && scale > 0.0 { scale.min(1e6) } else { 1.0 };
-        Some(Self { middle: bounds.map(|[low, high]| 0.5 * low + 0.5 * high), scale })
-    }
-
-    /// Where a place of the plane is in the picture; `None` far outside.
-    fn place(&self, [right, up]: [f64; 2]) -> Option<[f64; 2]> {
-        let x = 0.5 * WIDTH + (right - self.middle[0]) * self.scale;
-        let y = HEAD + 0.5 * (HEIGHT - HEAD) - (up - self.middle[1]) * self.scale;
-        (x.abs() < FARTHEST && y.abs() < FARTHEST).then_some([x, y])
-    }
 }
 
 /// Draws the lines; gives the colour of each group, the largest groups first.
@@ -157,65 +86,22 @@ fn lines(
     shapes: &Shapes,
     fit: &Fit,
 ) -> Vec<(GroupId, &'static str, usize)> {
-    let mut largest: Vec<&StructuralGroup> = scene.groups.iter().collect();
-    largest.sort_by_key(|group| (std::cmp::Reverse(group.line_ids.len()), group.group_id));
+    let (largest, rank_of) = ranked(scene.groups);
+    let colour = |rank: usize| COLOURS[rank % COLOURS.len()];
     let colours: Vec<(GroupId, &'static str, usize)> = largest
         .iter()
         .enumerate()
-        .map(|(place, group)| (group.group_id, COLOURS[place % COLOURS.len()], group.line_ids.len()))
+        .map(|(rank, group)| (group.group_id, colour(rank), group.line_ids.len()))
         .collect();
-    let mut colour_of: BTreeMap<LineId, &str> = BTreeMap::new();
-    for (group, (_, colour, _)) in largest.iter().zip(&colours) {
-        for line in &group.line_ids {
-            colour_of.entry(*line).or_insert(colour);
-        }
-    }
     let mut strokes: BTreeMap<&str, Vec<[[f64; 2]; 2]>> = BTreeMap::new();
     for (line, [start, end]) in &shapes.lines {
         let Some(stroke) = fit.place(*start).zip(fit.place(*end)) else { continue };
-        strokes.entry(colour_of.get(line).copied().unwrap_or(QUIET)).or_default().push(stroke.into());
+        strokes.entry(rank_of.get(line).map_or(QUIET, |rank| colour(*rank))).or_default().push(stroke.into());
     }
     for (colour, strokes) in strokes {
         svg.strokes(strokes.iter().map(|stroke| &stroke[..]), 3.0, colour, 0.9);
     }
     colours
-}
-
-/// Draws some cameras along the path, as the pyramids of what they see.
-fn cameras(svg: &mut Svg, scene: &Scene<'_>, shapes: &Shapes, plane: &Plane, fit: &Fit) {
-    let posed: Vec<&Frame> =
-        scene.frames.iter().filter(|frame| frame.world_from_camera().is_some()).collect();
-    // Smaller where the path is short in the picture, so that its cameras do not hide each other.
-    let spread = |axis: usize| {
-        let places = || shapes.path.iter().map(|place| place[axis]);
-        let (low, high) =
-            places().fold((f64::MAX, f64::MIN), |(low, high), place| (low.min(place), high.max(place)));
-        (high - low).max(0.0)
-    };
-    let size = (0.11 * (spread(0) + spread(1)) * fit.scale).clamp(16.0, 46.0);
-    let depth = size / fit.scale;
-    let mut strokes: Vec<Vec<[f64; 2]>> = Vec::new();
-    for frame in thinned(&posed, CAMERAS) {
-        let Some(Ok(pose)) = frame.world_from_camera().map(|pose| pose.pose()) else { continue };
-        let camera = scene.manifest.camera(frame.camera_id).map(crate::structure::Camera::projection);
-        let (half_width, half_height) = camera.map_or((0.6, 0.45), |camera| {
-            let half = |size: u32, focal: f64| (0.5 * f64::from(size) / focal.abs()).clamp(0.1, 1.5);
-            (half(camera.width, camera.fx), half(camera.height, camera.fy))
-        });
-        let at = |x: f64, y: f64, z: f64| {
-            fit.place(
-                plane.place(pose.translation() + pose.transform_vector(&(Vector3::new(x, y, z) * depth)))?,
-            )
-        };
-        let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
-            .map(|(x, y)| at(x * half_width, y * half_height, 1.0));
-        let (Some(apex), [Some(a), Some(b), Some(c), Some(d)]) = (at(0.0, 0.0, 0.0), corners) else {
-            continue;
-        };
-        strokes.push(vec![a, b, c, d, a, apex, b]);
-        strokes.push(vec![c, apex, d]);
-    }
-    svg.strokes(strokes.iter().map(Vec::as_slice), 1.3, INK, 0.75);
 }
 
 /// Marks where the path begins (a disc) and where it ends (a ring).
@@ -272,12 +158,7 @@ fn axes(svg: &mut Svg, shapes: &Shapes) {
 
 /// A bar of a round length, in the lower right corner.
 fn scale(svg: &mut Svg, fit: &Fit) {
-    let metres = 150.0 / fit.scale;
-    let power = libm::pow(10.0, libm::floor(libm::log10(metres)));
-    let round = [5.0, 2.0, 1.0].into_iter().find(|part| part * power <= metres).unwrap_or(1.0) * power;
-    if !round.is_finite() {
-        return;
-    }
+    let Some(round) = round_length(150.0 / fit.scale) else { return };
     let (right, y) = (WIDTH - MARGIN, HEIGHT - MARGIN);
     let left = right - round * fit.scale;
     svg.strokes(
@@ -286,14 +167,14 @@ fn scale(svg: &mut Svg, fit: &Fit) {
         INK,
         1.0,
     );
-    let words = if (1e-3..1e5).contains(&round) { format!("{round} m") } else { format!("{round:e} m") };
-    svg.words([0.5 * (left + right), y - 10.0], 15.0, "middle", INK, &words);
+    svg.words([0.5 * (left + right), y - 10.0], 15.0, "middle", INK, &metres_in_words(round));
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::structure::{FrameId, PointId, PoseRow};
+    use nalgebra::Vector3;
     use proptest::prelude::*;
 
     fn point(id: i64, place: [f64; 3]) -> PointLandmark {
@@ -339,7 +220,7 @@ mod tests {
         let fit = |points: &[PointLandmark]| {
             let scene =
                 Scene { manifest: &manifest, frames: &[], points, lines: &[], groups: &[], edges: &[] };
-            Fit::new(&shapes(&scene, &plane)).unwrap()
+            Fit::new(&Shapes::of(&scene, &plane), ROOM).unwrap()
         };
         let before = fit(&points).scale;
         points.push(point(5000, [1e6, 1e6, 0.0]));

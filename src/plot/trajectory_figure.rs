@@ -134,14 +134,18 @@ fn draw_map(svg: &mut Svg, panel: Area, path: &ComparedPath<'_>, plane: &Plane) 
 }
 
 /// A unit of length for numbers of a size.
-pub(super) struct LengthUnit {
-    pub(super) name: &'static str,
-    pub(super) per_metre: f64,
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LengthUnit {
+    /// Its sign, such as `cm`.
+    pub name: &'static str,
+    /// How many of it are a metre.
+    pub per_metre: f64,
 }
 
 impl LengthUnit {
     /// The unit in which the largest of some lengths is between 1 and 100 or so.
-    pub(super) fn of(metres: f64) -> Self {
+    #[must_use]
+    pub fn of(metres: f64) -> Self {
         match metres {
             m if m >= 1.0 => Self { name: "m", per_metre: 1.0 },
             m if m >= 0.01 => Self { name: "cm", per_metre: 100.0 },

@@ -25,14 +25,19 @@ impl ViewFrom {
 
 /// The plane of the picture: right and up, in `world`.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Plane {
+pub struct Plane {
     pub(super) right: Vector3<f64>,
     pub(super) up: Vector3<f64>,
 }
 
 impl Plane {
-    /// * `upward` — a unit vector of `world` that points up.
-    pub(super) fn new(view: ViewFrom, upward: Vector3<f64>) -> Result<Self, Error> {
+    /// The plane that is seen from somewhere.
+    ///
+    /// * `upward` — a unit vector of `world` that points up; see [`upward`].
+    ///
+    /// # Errors
+    /// [`Error::View`] for angles that are none.
+    pub fn new(view: ViewFrom, upward: Vector3<f64>) -> Result<Self, Error> {
         let ViewFrom { azimuth_degrees, elevation_degrees } = view;
         if !(azimuth_degrees.is_finite() && elevation_degrees.abs() <= 90.0) {
             return Err(Error::View { azimuth_degrees, elevation_degrees });
@@ -48,9 +53,24 @@ impl Plane {
     }
 
     /// Where a place is in the picture: to the right and up, metres; `None` for one that is not finite.
-    pub(super) fn place(&self, place: Vector3<f64>) -> Option<[f64; 2]> {
+    #[must_use]
+    pub fn place(&self, place: Vector3<f64>) -> Option<[f64; 2]> {
         let flat = [self.right.dot(&place), self.up.dot(&place)];
         flat.iter().all(|coordinate| coordinate.is_finite()).then_some(flat)
+    }
+
+    /// What is to the right and what is up: an axis of `world`, as `x` or `−z`, where there is one along it.
+    #[must_use]
+    pub fn names(&self) -> [String; 2] {
+        let named = |way: &Vector3<f64>, otherwise: &str| {
+            let axis = way.iamax();
+            // Cosines of right angles are zero to rounding.
+            if way[axis].abs() < 1.0 - 1e-9 {
+                return otherwise.to_owned();
+            }
+            format!("{}{}", if way[axis] < 0.0 { "−" } else { "" }, ["x", "y", "z"][axis])
+        };
+        [named(&self.right, "right"), named(&self.up, "up")]
     }
 }
 
@@ -83,8 +103,11 @@ mod tests {
         let plane = Plane::new(ViewFrom::TOP, Vector3::z()).unwrap();
         near(plane.right, Vector3::x());
         near(plane.up, Vector3::y());
+        assert_eq!(plane.names(), ["x", "y"]);
         let plane = Plane::new(ViewFrom::SIDE, Vector3::z()).unwrap();
         near(plane.up, Vector3::z());
+        assert_eq!(Plane::new(ViewFrom::TOP, -Vector3::y()).unwrap().names(), ["z", "−x"]);
+        assert_eq!(Plane::new(ViewFrom::OBLIQUE, Vector3::z()).unwrap().names(), ["right", "up"]);
     }
 
     #[test]

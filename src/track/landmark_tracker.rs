@@ -1,6 +1,7 @@
 //! Tracking against landmarks with covariances: all that were seen, or those of the last frame.
 
 use std::collections::BTreeMap;
+use std::mem;
 
 use nalgebra::{Matrix6, Vector6};
 
@@ -129,8 +130,9 @@ impl LandmarkTracker {
         let numbers = alignment.map_or(0, |alignment| alignment.numbers);
         // After a predicted frame, the last one that was tracked still counts.
         if self.memory == Memory::LastFrame && alignment.is_some() {
-            self.past_points.append(&mut self.points);
-            self.past_lines.append(&mut self.lines);
+            // Not `append`, which builds the whole past anew.
+            self.past_points.extend(mem::take(&mut self.points));
+            self.past_lines.extend(mem::take(&mut self.lines));
             self.pending_points.retain(|id, _| seen.points.binary_search_by_key(id, |s| s.id).is_ok());
             self.pending_lines.retain(|id, _| seen.lines.binary_search_by_key(id, |s| s.id).is_ok());
         }

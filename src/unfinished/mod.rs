@@ -9,13 +9,19 @@ use std::sync::{Mutex, PoisonError};
 /// Temporary names that are in use, for [`discard`].
 static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-/// Removes every unfinished output of this process: what a program does when it is interrupted.
+/// Removes every unfinished output of this process: the last thing that a program does when it is interrupted.
+///
+/// A thread that begins or ends an output afterwards waits for the end of the process: it would fail for want of what
+/// was removed here, and report that instead of the interruption.
 pub fn discard() {
-    for path in UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).iter() {
+    let unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
+    for path in unfinished.iter() {
         // Other threads go on writing: a file that appears in a folder while it is emptied keeps it from going.
         // Nothing more can be done about a temporary file that cannot be removed.
         let _ = (0..100).find(|_| remove(path).is_ok());
     }
+    // Never unlocked.
+    std::mem::forget(unfinished);
 }
 
 /// A file or folder beside its final name; it vanishes when it is not finished.

@@ -131,6 +131,19 @@ fn viewers_are_shown_what_the_tables_say() {
 }
 
 #[test]
+fn rerun_reads_what_the_tables_say() {
+    for cameras in [sample::CAMERAS, sample::MIRRORED_CAMERAS] {
+        let sequence = sample::sequence(cameras);
+        let files = Files::write(&sequence);
+        let [recording, again] = ["sample.rrd", "again.rrd"].map(|name| files.folder.path().join(name));
+        format::write_rerun(&recording, &sequence).unwrap();
+        format::write_rerun(&again, &sequence).unwrap();
+        assert!(fs::read(&recording).unwrap() == fs::read(again).unwrap(), "same rows, same bytes");
+        run("rerun_recording.py", &[&recording, &files.rows()]);
+    }
+}
+
+#[test]
 fn every_parquet_table_is_read_in_one_line() {
     let files = Files::write(&sample::sequence(sample::CAMERAS));
     run("parquet_tables.py", &[&files.parquet(), &files.rows(), &files.schemas()]);

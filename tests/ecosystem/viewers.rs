@@ -74,6 +74,68 @@ fn without_any_truth_the_camera_moves_along_the_first_estimate() {
 }
 
 #[test]
+fn the_layout_asks_for_topics_that_a_file_has() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("show.mcap");
+    let mut sequence = sample::sequence(sample::CAMERAS);
+    // Every estimate that `os track` and `os adjust` name themselves.
+    let usual = ["map-to-frame", "frame-to-frame", "point-ba", "point-line-ba", "structural-ba"];
+    let named = |name: &str| name.to_owned();
+    let (trajectories, points, lines) =
+        (sequence.trajectories.clone(), sequence.map_points.clone(), sequence.map_lines.clone());
+    for name in usual {
+        let estimate = named(name);
+        sequence.trajectories.extend(
+            trajectories.iter().cloned().map(|row| TrajectoryPose { estimate: estimate.clone(), ..row }),
+        );
+        sequence
+            .map_points
+            .extend(points.iter().cloned().map(|row| MapPoint { estimate: estimate.clone(), ..row }));
+        sequence
+            .map_lines
+            .extend(lines.iter().cloned().map(|row| MapLine { estimate: estimate.clone(), ..row }));
+    }
+    sequence.sort();
+    sequence
+        .trajectories
+        .dedup_by(|left, right| (&left.estimate, left.frame_id) == (&right.estimate, right.frame_id));
+    sequence
+        .map_points
+        .dedup_by(|left, right| (&left.estimate, left.point_id) == (&right.estimate, right.point_id));
+    sequence
+        .map_lines
+        .dedup_by(|left, right| (&left.estimate, left.line_id) == (&right.estimate, right.line_id));
+    format::write(&path, &sequence, OPTIONS).unwrap();
+    let bytes = fs::read(&path).unwrap();
+    let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+    let topics: Vec<&str> = summary.channels.values().map(|channel| channel.topic.as_str()).collect();
+
+    let layout = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/lichtblick-layout.json");
+    let layout: serde_json::Value = serde_json::from_str(&fs::read_to_string(layout).unwrap()).unwrap();
+    let panels = layout["configById"].as_object().unwrap();
+    let scene = panels["3D!scene"]["topics"].as_object().unwrap();
+    let image = &panels["Image!measurements"]["imageMode"];
+    let mut asked: Vec<&str> = scene.keys().map(String::as_str).collect();
+    asked.push(image["calibrationTopic"].as_str().unwrap());
+    asked.extend(image["annotations"].as_object().unwrap().keys().map(String::as_str));
+    let mut plotted = 0;
+    for plot in panels.iter().filter(|(id, _)| id.starts_with("Plot!")).map(|(_, plot)| plot) {
+        for series in plot["paths"].as_array().unwrap() {
+            // A message path: the topic, then members of its message.
+            asked.push(series["value"].as_str().unwrap().split('.').next().unwrap());
+            plotted += 1;
+        }
+    }
+    assert_eq!((plotted, scene.len()), (7, 19));
+    for topic in asked {
+        assert!(topics.contains(&topic), "{topic}: {topics:?}");
+    }
+    // Every panel that is placed has its settings.
+    let placed = layout["layout"].to_string();
+    assert!(panels.keys().all(|id| placed.contains(id.as_str())), "{placed}");
+}
+
+#[test]
 fn rows_that_cannot_be_shown_do_not_hinder_writing() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("strange.mcap");

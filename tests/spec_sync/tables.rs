@@ -43,7 +43,8 @@ pub(crate) fn columns(name: &str) -> Option<String> {
         let description = table.fields.iter().find(|field| field.name == *name)?.description();
         let nullable = if *nullable { ", nullable" } else { "" };
         let since = if *since == "1.0.0" { String::new() } else { format!(", since {since}") };
-        let kind = kind.name();
+        // Without the bar `<int64>` would be markup.
+        let kind = kind.name().replace('<', r"\<");
         let _ = writeln!(
             text,
             "| `{name}` | {kind}{nullable}{since} | {unit} | {space} | {} |",

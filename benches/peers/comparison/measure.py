@@ -11,9 +11,9 @@ LEAST_PART = 1e-3
 PATIENCE = 4.0
 # Other peers are given this many times as long as Ceres takes to its end, and never less than this many seconds.
 TIMES_CERES = 20.0
-LEAST_SECONDS = 5.0
+LEAST_SECONDS = 3.0
 # Rounds of runs in turn, by the seconds that a round takes.
-ROUNDS = [(2.0, 7), (10.0, 5), (30.0, 3)]
+ROUNDS = [(2.0, 5), (15.0, 3)]
 
 
 @dataclass
@@ -189,14 +189,20 @@ class Paced:
         return self.seconds[method] / self.seconds["point"]
 
 
-def pace(sequence, methods, own, limits, rounds):
+def pace(sequence, methods, own, limits):
     """Seconds for an iteration of each method, all of an adjustment over its steps: medians of runs in turn."""
     found = {method: [] for method in methods}
-    for _ in range(rounds):
+    rounds, done = 1, 0
+    while done < rounds:
+        spent = 0.0
         for method in methods:
             run = own.run(sequence.path, method, limits)
             if not isinstance(run, str) and run.steps > 0:
                 found[method].append(run.seconds / run.steps)
+                spent += run.seconds
+        if done == 0:
+            rounds = next((rounds for most, rounds in ROUNDS if spent <= most), 1)
+        done += 1
     if not all(found.values()):
         return None
     return Paced(sequence.name, {method: statistics.median(seconds) for method, seconds in found.items()})

@@ -1,5 +1,7 @@
 """The table as Markdown, and its place in the README."""
 
+import statistics
+
 BEGIN, END = "<!-- peers -->\n", "<!-- /peers -->\n"
 # Most that an iteration with lines or with structure may take over one of points alone.
 MOST_OVER_POINTS = 1.5
@@ -58,22 +60,27 @@ def row(cells):
 
 
 def summary(compared, names):
-    """How we stand against each peer, over the problems that both time."""
-    words = []
-    for name in names:
-        ratios = [
-            entry.ours.median / entry.peers[name].median
-            for entry in compared
-            if name in entry.peers and entry.peers[name].same_cost and entry.ours.median and entry.peers[name].median
-        ]
-        if ratios:
-            ratios.sort()
-            faster = sum(ratio < 1.0 for ratio in ratios)
-            words.append(
-                f"{name}: faster on {faster} of {len(ratios)}, ours over it {number(ratios[0])} to {number(ratios[-1])}, "
-                f"median {number(ratios[len(ratios) // 2])}"
-            )
-    return "; ".join(words) + "." if words else ""
+    """How we stand against each peer, over the problems that both time; and by kind of problem against the first."""
+    words = [standing(compared, name, name) for name in names]
+    for group in dict.fromkeys(entry.group for entry in compared):
+        words.append(standing([entry for entry in compared if entry.group == group], names[0], f"{names[0]}, {group}"))
+    return "; ".join(filter(None, words)) + "." if any(words) else ""
+
+
+def standing(compared, name, label):
+    """How we stand against a peer; nothing where no problem is timed by both."""
+    ratios = sorted(
+        entry.ours.median / entry.peers[name].median
+        for entry in compared
+        if name in entry.peers and entry.peers[name].same_cost and entry.ours.median and entry.peers[name].median
+    )
+    if not ratios:
+        return ""
+    faster = sum(ratio < 1.0 for ratio in ratios)
+    return (
+        f"{label}: faster on {faster} of {len(ratios)}, ours over it {number(ratios[0])} to {number(ratios[-1])}, "
+        f"in geometric mean {number(statistics.geometric_mean(ratios))}"
+    )
 
 
 def markdown(label, compared, paced, methods, names, missing):

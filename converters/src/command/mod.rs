@@ -1,5 +1,7 @@
 //! Commands of `os-convert`: arguments, calls, rendering.
 
+pub mod completions;
+pub mod man;
 mod parse;
 mod progress;
 pub mod rgbd;

@@ -18,13 +18,13 @@ const PALETTE: [[f64; 3]; 6] = [
 /// Each round through the palette is this much darker than the one before, down to two fifths.
 const DARKER: [f64; 3] = [1.0, 0.65, 0.4];
 /// Points: Okabe and Ito's bluish green.
-pub(super) const POINT: Color = Color { r: 0.0, g: 0.62, b: 0.451, a: 1.0 };
+pub(in crate::format) const POINT: Color = Color { r: 0.0, g: 0.62, b: 0.451, a: 1.0 };
 /// Lines of no group.
 const UNGROUPED: Color = Color { r: 0.55, g: 0.55, b: 0.55, a: 1.0 };
 
 /// The colour of each line.
 #[derive(Default)]
-pub(super) struct GroupColors {
+pub(in crate::format) struct GroupColors {
     groups: usize,
     /// Rank of the group of each line.
     group_of: BTreeMap<LineId, usize>,
@@ -32,7 +32,7 @@ pub(super) struct GroupColors {
 
 impl GroupColors {
     /// Gives the next colour to a group; a line in two groups keeps its first.
-    pub(super) fn add(&mut self, group: &StructuralGroup) {
+    pub(in crate::format) fn add(&mut self, group: &StructuralGroup) {
         for line in &group.line_ids {
             self.group_of.entry(*line).or_insert(self.groups);
         }
@@ -40,7 +40,10 @@ impl GroupColors {
     }
 
     /// Lines by colour, the colours in the order of the groups, those of no group first.
-    pub(super) fn by_color<T>(&self, lines: impl Iterator<Item = (LineId, T)>) -> Vec<(Color, Vec<T>)> {
+    pub(in crate::format) fn by_color<T>(
+        &self,
+        lines: impl Iterator<Item = (LineId, T)>,
+    ) -> Vec<(Color, Vec<T>)> {
         let mut runs: BTreeMap<Option<usize>, Vec<T>> = BTreeMap::new();
         for (line, value) in lines {
             let group = self.group_of.get(&line).copied();

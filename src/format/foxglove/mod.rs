@@ -13,9 +13,9 @@
 //! They are a rendering: 32-bit points, normalised quaternions. Readers of the format pass over them.
 
 mod annotations;
-mod color;
+pub(super) mod color;
 mod scene;
-mod viewer_space;
+pub(super) mod viewer_space;
 
 use std::any::Any;
 use std::collections::BTreeMap;

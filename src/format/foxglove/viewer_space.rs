@@ -14,34 +14,42 @@ use crate::structure::{Camera, Manifest, PoseRow, registry};
 /// pose again, `fy` becomes positive, every landmark keeps its pixel, and what was up (y or z) stays up.
 /// The world's frame then has another name, so that nobody takes its numbers for those of the tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct ViewerSpace {
+pub(in crate::format) struct ViewerSpace {
     mirrored: bool,
 }
 
 impl ViewerSpace {
     /// The spaces for a sequence: mirrored if all of its cameras ask for it. One mirror must do for the
     /// whole world, so a sequence with both kinds is shown as it is, negative `fy` included.
-    pub(super) fn of(manifest: &Manifest) -> Self {
+    pub(in crate::format) fn of(manifest: &Manifest) -> Self {
         let cameras = &manifest.cameras;
         Self { mirrored: !cameras.is_empty() && cameras.iter().all(|camera| camera.fy < 0.0) }
     }
 
     /// Name of the world's coordinate frame.
-    pub(super) const fn world(self) -> &'static str {
+    pub(in crate::format) const fn world(self) -> &'static str {
         if self.mirrored { "world_with_x_negated" } else { "world" }
     }
 
     /// A point of the world, metres.
-    pub(super) fn point(self, point: Point3<f64>) -> [f64; 3] {
+    pub(in crate::format) fn point(self, point: Point3<f64>) -> [f64; 3] {
         [if self.mirrored { -point.x } else { point.x }, point.y, point.z]
     }
 
-    /// A pose of a camera in the world; `None` when the stored one is no pose.
-    pub(super) fn pose(self, world_from_camera: &PoseRow) -> Option<Pose> {
-        let ([x, y, z], [qx, qy, qz, qw]) = world_from_camera.pose().ok()?.components();
-        let [x, y, z] = self.point(Point3::new(x, y, z));
+    /// Position, and rotation as x y z w, of a camera in the world; `None` when the stored ones are no pose.
+    pub(in crate::format) fn position_and_rotation(
+        self,
+        world_from_camera: &PoseRow,
+    ) -> Option<([f64; 3], [f64; 4])> {
+        let (position, [x, y, z, w]) = world_from_camera.pose().ok()?.components();
         // Sw R Sc = Rx(π) R Rx(π)⁻¹ Rz(π), which only swaps the numbers of the quaternion.
-        let [qx, qy, qz, qw] = if self.mirrored { [-qy, -qx, qw, qz] } else { [qx, qy, qz, qw] };
+        let rotation = if self.mirrored { [-y, -x, w, z] } else { [x, y, z, w] };
+        Some((self.point(Point3::from(position)), rotation))
+    }
+
+    /// A pose of a camera in the world; `None` when the stored one is no pose.
+    pub(in crate::format) fn pose(self, world_from_camera: &PoseRow) -> Option<Pose> {
+        let ([x, y, z], [qx, qy, qz, qw]) = self.position_and_rotation(world_from_camera)?;
         Some(Pose {
             position: Some(Vector3 { x, y, z }),
             orientation: Some(Quaternion { x: qx, y: qy, z: qz, w: qw }),
@@ -49,7 +57,7 @@ impl ViewerSpace {
     }
 
     /// `fx, fy, cx, cy` of a camera, pixels from the corner of the image, see [`from_corner`].
-    pub(super) fn intrinsics(self, camera: &Camera) -> [f64; 4] {
+    pub(in crate::format) fn intrinsics(self, camera: &Camera) -> [f64; 4] {
         let fy = if self.mirrored { -camera.fy } else { camera.fy };
         let [cx, cy] = from_corner(camera, [camera.cx, camera.cy]);
         [camera.fx, fy, cx, cy]
@@ -57,7 +65,7 @@ impl ViewerSpace {
 }
 
 /// A pixel position counted from the outer corner of the top-left pixel, as viewers draw it.
-pub(super) fn from_corner(camera: &Camera, [u, v]: [f64; 2]) -> [f64; 2] {
+pub(in crate::format) fn from_corner(camera: &Camera, [u, v]: [f64; 2]) -> [f64; 2] {
     let shift = if camera.pixel_origin == registry::PIXEL_CENTER { 0.5 } else { 0.0 };
     [u + shift, v + shift]
 }

@@ -1,0 +1,58 @@
+//! What an input of a report is: a sequence, or what another command wrote.
+
+use std::fs::{self, File};
+use std::io::Read as _;
+use std::path::Path;
+
+use super::error::Error;
+use super::json_results::Results;
+use crate::format;
+
+/// Largest JSON file that is read.
+const MOST_JSON_BYTES: u64 = 1 << 26;
+/// Tables of a folder that `os benchmark` wrote.
+const SUMMARY: &str = "summary.parquet";
+const CURVES: &str = "curves.parquet";
+/// What tells a sequence's folder.
+const MANIFEST: &str = "sequence.json";
+
+/// An input of a report.
+pub(super) enum Input {
+    /// An MCAP file or a Parquet folder.
+    Sequence,
+    /// What other commands found.
+    Results(Box<Results>),
+}
+
+impl Input {
+    /// Looks at a path; reads it if it holds results.
+    pub(super) fn of(path: &Path) -> Result<Self, Error> {
+        let io = |cause| Error::Io { path: path.to_owned(), cause };
+        let found = fs::metadata(path).map_err(io)?;
+        if found.is_dir() {
+            if path.join(MANIFEST).exists() || !path.join(SUMMARY).is_file() {
+                return Ok(Self::Sequence);
+            }
+            let summary = format::read_results(&path.join(SUMMARY))?;
+            let curves = path.join(CURVES);
+            let curves = curves.is_file().then(|| format::read_results(&curves)).transpose()?;
+            return Ok(Self::Results(Box::new(Results::of_tables(path, &summary, curves.as_ref())?)));
+        }
+        let mut file = File::open(path).map_err(io)?;
+        let mut begin = Vec::new();
+        file.by_ref().take(64).read_to_end(&mut begin).map_err(io)?;
+        let is_json = begin
+            .iter()
+            .find(|byte| !byte.is_ascii_whitespace())
+            .is_some_and(|byte| matches!(byte, b'{' | b'['));
+        if !is_json || path.file_name().is_some_and(|name| name == MANIFEST) {
+            return Ok(Self::Sequence);
+        }
+        if found.len() > MOST_JSON_BYTES {
+            let found = format!("{} bytes of JSON, over {MOST_JSON_BYTES}", found.len());
+            return Err(Error::UnknownInput { path: path.to_owned(), found });
+        }
+        file.take(MOST_JSON_BYTES).read_to_end(&mut begin).map_err(io)?;
+        Ok(Self::Results(Box::new(Results::of_json(path, &begin)?)))
+    }
+}

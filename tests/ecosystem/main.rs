@@ -139,7 +139,9 @@ fn rerun_reads_what_the_tables_say() {
         format::write_rerun(&recording, &sequence).unwrap();
         format::write_rerun(&again, &sequence).unwrap();
         assert!(fs::read(&recording).unwrap() == fs::read(again).unwrap(), "same rows, same bytes");
-        run("rerun_recording.py", &[&recording, &files.rows()]);
+        let manifest = files.folder.path().join("manifest.json");
+        fs::write(&manifest, serde_json::to_string(&sequence.manifest).unwrap()).unwrap();
+        run("rerun_recording.py", &[&recording, &files.rows(), &manifest]);
     }
 }
 

@@ -1,12 +1,13 @@
 """Reads a recording with Rerun and draws the scene as its viewer would: everything meets in the image."""
 
+import json
 import sys
 from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rerun.experimental import RrdReader
+from rerun.chunk import RrdReader
 
 import expected
 
@@ -48,8 +49,11 @@ def rotation(q: list[float]) -> np.ndarray:
     )
 
 
-def main(path: Path, rows: dict[str, list[expected.Row]]) -> None:
+def main(path: Path, rows: dict[str, list[expected.Row]], manifest: dict[str, Any]) -> None:
     found = Recording(path)
+    # Pixels of a viewer count from the corner of the first one; some cameras of the sample count from its centre.
+    origins = {"pixel-center": 0.5, "pixel-corner": 0.0}
+    shifts = {camera["camera_id"]: origins[camera["pixel_origin"]] for camera in manifest["cameras"]}
     first = rows["frames"][0]["stamp_nanos"]
     landmarks = np.array(found.always["/world/landmarks/points"]["Points3D:positions"])
     index = {row["point_id"]: place for place, row in enumerate(rows["point_landmarks"])}
@@ -75,8 +79,8 @@ def main(path: Path, rows: dict[str, list[expected.Row]]) -> None:
         measured = of_frame("point_measurements") or of_frame("line_measurements")
         kind = "measurements" if measured else "observations"
         points = found.frames[f"{camera}/points"][frame_id]["Points2D:positions"]
-        # Pixels of the sample count from the centre of the first one, those of the viewer from its corner.
-        wanted = np.array([[row["u"], row["v"]] for row in of_frame(f"point_{kind}")]).reshape(-1, 2) + 0.5
+        shift = shifts[frame["camera_id"]]
+        wanted = np.array([[row["u"], row["v"]] for row in of_frame(f"point_{kind}")]).reshape(-1, 2) + shift
         assert np.abs(np.array(points).reshape(-1, 2) - wanted).max(initial=0) < 1e-3, frame_id
         segments = found.frames[f"{camera}/lines"][frame_id]
         assert len(segments["LineStrips2D:strips"]) == len(of_frame(f"line_{kind}")) == len(segments["LineStrips2D:colors"])
@@ -93,7 +97,7 @@ def main(path: Path, rows: dict[str, list[expected.Row]]) -> None:
         places = landmarks[[index[row["point_id"]] for row in observed]]
         seen = (places - np.array(translation)) @ world_from_camera @ np.array(k).reshape(3, 3)
         assert (seen[:, 2] > 0).all()
-        wanted = np.array([[row["u"], row["v"]] for row in observed]) + 0.5
+        wanted = np.array([[row["u"], row["v"]] for row in observed]) + shift
         assert np.abs(seen[:, :2] / seen[:, 2:] - wanted).max() < TOLERANCE_PX, frame_id
         drawn += 1
     assert drawn > 0
@@ -102,5 +106,5 @@ def main(path: Path, rows: dict[str, list[expected.Row]]) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), expected.load(Path(sys.argv[2])))
+    main(Path(sys.argv[1]), expected.load(Path(sys.argv[2])), json.loads(Path(sys.argv[3]).read_text()))
     expected.leave()

@@ -18,6 +18,7 @@ pub mod plot;
 pub mod report;
 pub mod simulate;
 pub mod statistics;
+pub mod storage;
 pub mod structure;
 pub mod track;
 mod unfinished;

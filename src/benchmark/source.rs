@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::Error;
 use crate::format;
 use crate::simulate::{self, Recipe};
+use crate::storage;
 use crate::structure::Sequence;
 
 /// The sequence of a path or of a recipe's name, whole.
@@ -18,11 +19,11 @@ pub fn load(name: &str) -> Result<Sequence, Error> {
     let path = Path::new(name);
     let recipe = |cause| Error::Recipe { name: name.to_owned(), cause };
     let is_recipe = path.extension().is_some_and(|extension| extension == "toml");
-    if path.exists() && !is_recipe {
+    if storage::exists(path) && !is_recipe {
         return Ok(format::read(path)?);
     }
     let (made, folder) = if is_recipe {
-        let text = std::fs::read_to_string(path).map_err(Error::io(path))?;
+        let text = storage::read_to_string(path).map_err(Error::io(path))?;
         (Recipe::from_toml(&text).map_err(recipe)?, path.parent().map(Path::to_owned).unwrap_or_default())
     } else if simulate::names().contains(&name) {
         (simulate::named(name).map_err(recipe)?, PathBuf::new())

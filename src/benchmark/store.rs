@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
@@ -9,6 +10,7 @@ use serde::de::DeserializeOwned;
 
 use super::content::Content;
 use super::{Bound, Cell, CellKey, Error, Plan};
+use crate::storage;
 use crate::unfinished::Unfinished;
 
 /// The file that says what the folder holds.
@@ -46,10 +48,9 @@ impl Store {
         let store = Self { folder: folder.to_owned() };
         let file = folder.join(PLAN_FILE);
         let version = env!("CARGO_PKG_VERSION").to_owned();
-        let begun = file.exists();
-        let other =
-            folder.exists() && !begun && fs::read_dir(folder).map_err(Error::io(folder))?.next().is_some();
-        if other {
+        let begun = storage::is_taken(&file).map_err(Error::io(&file))?;
+        let is_there = begun || storage::is_taken(folder).map_err(Error::io(folder))?;
+        if is_there && !begun && !storage::list(folder, &[]).map_err(Error::io(folder))?.is_empty() {
             // Never taken for ours, whatever is asked for.
             return Err(Error::Stored {
                 path: folder.to_owned(),
@@ -61,18 +62,15 @@ impl Store {
         if begun && anew {
             for part in [CELLS, BOUNDS, CONTENTS] {
                 let path = folder.join(part);
-                if path.is_dir() {
-                    fs::remove_dir_all(&path).map_err(Error::io(&path))?;
-                }
+                storage::remove(&path).map_err(Error::io(&path))?;
             }
         } else if begun {
-            let stored: StoredPlan = read(&file)?;
-            let difference = if stored.version != version {
-                Some(format!("of version {}, this is {version}", stored.version))
-            } else if stored.plan.noise != plan.noise {
-                Some("of other noise".to_owned())
-            } else {
-                None
+            let difference = match read::<StoredPlan>(&file)? {
+                Some(stored) if stored.version != version => {
+                    Some(format!("of version {}, this is {version}", stored.version))
+                }
+                Some(stored) if stored.plan.noise != plan.noise => Some("of other noise".to_owned()),
+                _ => None,
             };
             if let Some(difference) = difference {
                 return Err(Error::OtherPlan { path: folder.to_owned(), difference });
@@ -106,8 +104,7 @@ impl Store {
         let path = self.folder.join(CONTENTS).join(format!("{name}.json"));
         let mut stale = Vec::new();
         let mut content = content.clone();
-        if path.exists() {
-            let stored: Content = read(&path)?;
+        if let Some(stored) = read::<Content>(&path)? {
             if stored.measured == content.measured {
                 let other = |(estimate, digest): (&String, &String)| {
                     stored.estimates.get(estimate).is_none_or(|stored| stored != digest)
@@ -131,13 +128,12 @@ impl Store {
             stale.push(self.folder.join(CELLS).join(&name));
             stale.push(self.bound_file(sequence));
         }
-        stale.retain(|path| path.exists());
+        let mut removed = false;
         for path in &stale {
-            let removed = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
-            removed.map_err(Error::io(path))?;
+            removed |= storage::remove(path).map_err(Error::io(path))?;
         }
         write(&path, &content)?;
-        Ok(!stale.is_empty())
+        Ok(removed)
     }
 
     /// The cell of a key, where it is done.
@@ -146,10 +142,7 @@ impl Store {
     /// [`Error::Io`], [`Error::Stored`] for a file that is no cell, or another one.
     pub fn cell(&self, key: &CellKey) -> Result<Option<Cell>, Error> {
         let path = self.cell_file(key);
-        if !path.exists() {
-            return Ok(None);
-        }
-        let cell: Cell = read(&path)?;
+        let Some(cell) = read::<Cell>(&path)? else { return Ok(None) };
         if cell.key != *key {
             let detail = format!("expected the cell of {key:?}, found that of {:?}", cell.key);
             return Err(Error::Stored { path, detail });
@@ -170,8 +163,7 @@ impl Store {
     /// # Errors
     /// [`Error::Io`], [`Error::Stored`].
     pub fn bound(&self, sequence: &str) -> Result<Option<BTreeMap<String, Bound>>, Error> {
-        let path = self.bound_file(sequence);
-        if path.exists() { read(&path).map(Some) } else { Ok(None) }
+        read(&self.bound_file(sequence))
     }
 
     /// Keeps the bounds of a sequence.
@@ -197,10 +189,15 @@ fn file_name(name: &str) -> String {
     format!("{safe}.{hash:016x}")
 }
 
-fn read<T: DeserializeOwned>(path: &Path) -> Result<T, Error> {
-    let text = fs::read_to_string(path).map_err(Error::io(path))?;
+/// What a file holds; `None` where none is.
+fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, Error> {
+    let text = match storage::read_to_string(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+        text => text.map_err(Error::io(path))?,
+    };
     let damaged = |cause| format!("{cause}; what it held is made anew once it is removed");
     serde_json::from_str(&text)
+        .map(Some)
         .map_err(|cause| Error::Stored { path: path.to_owned(), detail: damaged(cause) })
 }
 

@@ -16,6 +16,7 @@ use crate::adjust::{
     PointForm, SolverOptions, Step, Summary, adjust_watched,
 };
 use crate::format;
+use crate::storage;
 use crate::structure::{Estimate, FactorGraph, FrameId, Sequence};
 
 /// Adjust a factor graph: move poses and landmarks to where the measurements agree best.
@@ -261,7 +262,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     if let Some(from) = args.from.map_or_else(|| foreign::of(&args.input), |from| Ok(Some(from)))? {
         return adjust_foreign::run(args, from, stdout);
     }
-    if args.input.is_file() && args.input.extension().is_none_or(|extension| extension != "mcap") {
+    if storage::is_file(&args.input) && args.input.extension().is_none_or(|extension| extension != "mcap") {
         format::open(&args.input).map(drop).with_context(|| {
             let input = args.input.display();
             format!(

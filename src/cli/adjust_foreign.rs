@@ -20,6 +20,7 @@ use crate::exchange::{
     read_g2o, with_estimate,
 };
 use crate::format::{self, Partial};
+use crate::storage;
 use crate::structure::{FactorGraph, Sequence, registry};
 
 /// The graph that is read.
@@ -30,11 +31,11 @@ const BAL_ESTIMATE: &str = "bal";
 pub(super) fn run(args: &Args, from: Foreign, stdout: &mut dyn Write) -> anyhow::Result<Outcome> {
     let as_file = is_file_of(&args.output, from)?;
     refuse_idle(args, from, as_file)?;
-    if args.input.is_dir() {
+    if storage::is_folder(&args.input) {
         bail!("{}: expected {}, found a folder", args.input.display(), from.words());
     }
     refuse_input(&args.input, &args.output)?;
-    if !args.force && args.output.symlink_metadata().is_ok() {
+    if !args.force && storage::is_taken(&args.output)? {
         return Err(format::Error::Exists { path: args.output.clone() }.into());
     }
     match from {
@@ -190,9 +191,9 @@ fn names(args: &Args) -> anyhow::Result<ImportNames> {
 
 fn read<T>(
     path: &Path,
-    parse: impl FnOnce(BufReader<File>) -> Result<T, exchange::Error>,
+    parse: impl FnOnce(BufReader<storage::File>) -> Result<T, exchange::Error>,
 ) -> anyhow::Result<T> {
-    let open = File::open(path).map(BufReader::new).with_context(|| path.display().to_string())?;
+    let open = storage::File::open(path).map(BufReader::new).with_context(|| path.display().to_string())?;
     parse(open).with_context(|| path.display().to_string())
 }
 
@@ -226,5 +227,5 @@ fn into_file(
     output.flush()?;
     drop(output);
     partial.finish()?;
-    Ok(text::bytes(text::size_on_disk(path)))
+    Ok(text::bytes(storage::size(path)))
 }

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use super::progress::Progress;
 use super::{Outcome, left_behind, text};
 use crate::format::{self, Encoding, WriteOptions};
+use crate::storage;
 
 /// Copy a sequence, from one encoding into the other or into the same.
 ///
@@ -37,7 +38,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         );
     }
     let reader = format::open(&args.sequence)?;
-    if args.output.exists() && args.output.canonicalize()? == args.sequence.canonicalize()? {
+    if storage::exists(&args.output) && storage::same(&args.output, &args.sequence) {
         anyhow::bail!("{}: is the input itself", args.output.display());
     }
     let mut outcome = left_behind::warn(&reader)?;
@@ -64,7 +65,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         args.output.display(),
         text::count(rows),
         written.tables.len(),
-        text::bytes(text::size_on_disk(&args.output))
+        text::bytes(storage::size(&args.output))
     )?;
     Ok(outcome)
 }

@@ -14,6 +14,7 @@ use crate::evaluate::{
 };
 use crate::format;
 use crate::plot;
+use crate::storage;
 use crate::structure::{FrameId, LineLandmark, MapLine, MapPoint, PointLandmark, TrajectoryPose};
 
 /// Compare estimates with the truth: absolute and relative errors of trajectories as evo defines them, errors of maps.
@@ -275,7 +276,7 @@ fn sequence(args: &Args, path: &Path, options: &EvaluateOptions) -> anyhow::Resu
 
 /// The name of a file or folder without its ending, which tells apart what was made of one sequence.
 pub(super) fn name_of(path: &Path) -> String {
-    let name = if path.is_dir() { path.file_name() } else { path.file_stem() };
+    let name = if storage::is_folder(path) { path.file_name() } else { path.file_stem() };
     name.map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
 }
 

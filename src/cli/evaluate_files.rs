@@ -1,6 +1,5 @@
 //! The part of `os evaluate` that compares trajectory files.
 
-use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
@@ -10,6 +9,7 @@ use super::evaluate::{Compared, evaluated, name_of};
 use crate::evaluate::{Error, EvaluateOptions, Matched, evaluate_matched};
 use crate::geometry::Pose;
 use crate::plot;
+use crate::storage::File;
 use crate::structure::{CameraId, Frame, FrameId, TrajectoryRow, read_trajectory};
 
 /// How stamps of two files are matched.

@@ -13,6 +13,7 @@ use crate::evaluate::{
 };
 use crate::format::{self, Partial};
 use crate::plot::{ComparedPath, EvaluatedEstimate, evaluation_figure};
+use crate::storage;
 use crate::structure::FrameId;
 
 #[derive(clap::Args, Debug)]
@@ -90,14 +91,7 @@ impl OutputArgs {
 
 /// Refuses an output that is an input, or lies in one.
 pub(super) fn refuse_input(output: &Path, inputs: &[PathBuf]) -> anyhow::Result<()> {
-    let folder = output.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok();
-    let place = folder.zip(output.file_name()).map(|(folder, name)| folder.join(name));
-    let taken = |input: &PathBuf| {
-        let input = input.canonicalize().ok();
-        input.zip(place.as_ref()).is_some_and(|(input, place)| place.starts_with(input))
-    };
-    if inputs.iter().any(taken) {
+    if inputs.iter().any(|input| storage::holds(input, output)) {
         anyhow::bail!("{}: is an input itself, or lies in one", output.display());
     }
     Ok(())

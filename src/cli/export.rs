@@ -14,6 +14,7 @@ use crate::exchange::{
     valued_graph,
 };
 use crate::format::{self, Partial};
+use crate::storage;
 use crate::structure::{FactorGraph, Sequence, TrajectoryFormat, write_trajectory};
 
 /// Export a graph, a path or the measurements of a sequence in the format of another program, or everything for a viewer.
@@ -107,7 +108,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     }
     refuse_input(&args.sequence, &args.output)?;
     let partial = Partial::new(&args.output, args.force)?;
-    if args.output.is_dir() {
+    if storage::is_folder(&args.output) {
         refuse_foreign(&args.output)?;
     }
     let reader = format::open(&args.sequence)?;
@@ -123,7 +124,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
             outcome = Outcome::Findings;
         }
     }
-    let size = text::bytes(text::size_on_disk(&args.output));
+    let size = text::bytes(storage::size(&args.output));
     writeln!(stdout, "{}: {what}, {size}", args.output.display())?;
     Ok(outcome)
 }
@@ -279,8 +280,8 @@ fn into_folder(partial: &Partial, files: &[TextFile]) -> anyhow::Result<()> {
 
 /// Refuses an output that is the input, or holds it.
 pub(super) fn refuse_input(input: &Path, output: &Path) -> anyhow::Result<()> {
-    let input = input.canonicalize().with_context(|| input.display().to_string())?;
-    if output.canonicalize().is_ok_and(|output| input.starts_with(output)) {
+    storage::find(input).with_context(|| input.display().to_string())?;
+    if storage::holds(output, input) {
         bail!("{}: is the input itself, or holds it", output.display());
     }
     Ok(())
@@ -294,8 +295,8 @@ fn refuse_foreign(folder: &Path) -> anyhow::Result<()> {
             name.extension().is_some_and(|end| ["txt", "csv", "json"].iter().any(|known| end == *known));
         ends || folders.iter().any(|known| name.ends_with(known))
     };
-    for entry in fs::read_dir(folder)? {
-        let path = entry?.path();
+    for entry in storage::list(folder, &[])? {
+        let path = folder.join(entry.name);
         if !known(&path) {
             bail!("{}: holds {}, which no export wrote; use another name", folder.display(), path.display());
         }

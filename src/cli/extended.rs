@@ -6,6 +6,7 @@ use anyhow::Context;
 
 use super::{Outcome, left_behind, text};
 use crate::format::{self, WriteOptions};
+use crate::storage;
 use crate::structure::{Sequence, registry};
 
 /// What the true poses are called where an estimate may be named.
@@ -15,14 +16,11 @@ const TRUTH: &str = "truth";
 ///
 /// Refuses an output that could not be written in the end, before any work.
 pub(super) fn read(input: &Path, output: &Path, force: bool) -> anyhow::Result<(Sequence, Outcome)> {
-    if let Some(folder) = output.parent().and_then(|folder| folder.canonicalize().ok())
-        && input.canonicalize().is_ok_and(|input| input.is_dir() && folder.starts_with(input))
-    {
+    if storage::is_folder(input) && storage::holds(input, output) && !storage::same(input, output) {
         anyhow::bail!("{}: lies in the input", output.display());
     }
-    if output.symlink_metadata().is_ok() {
-        let (input, output_found) = (input.canonicalize().ok(), output.canonicalize().ok());
-        if input.zip(output_found).is_some_and(|(input, output)| input.starts_with(&output)) {
+    if storage::is_taken(output).with_context(|| output.display().to_string())? {
+        if storage::holds(output, input) {
             anyhow::bail!("{}: is the input itself, or holds it", output.display());
         }
         if !force {
@@ -40,7 +38,7 @@ pub(super) fn write(output: &Path, mut sequence: Sequence, force: bool) -> anyho
     registry::SPEC_VERSION.clone_into(&mut sequence.manifest.spec_version);
     sequence.manifest.tables.clear();
     format::write(output, &sequence, WriteOptions { force, ..WriteOptions::default() })?;
-    Ok(text::bytes(text::size_on_disk(output)))
+    Ok(text::bytes(storage::size(output)))
 }
 
 /// Refuses a name that is taken already, unless it is to be replaced.

@@ -1,6 +1,5 @@
 //! `os fetch`: the images of a sequence, or what the first release has of it.
 
-use std::fs::File;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -13,6 +12,7 @@ use super::{Outcome, text};
 use crate::datasets::{self, MAX_RECIPE_BYTES, Recipe};
 use crate::fetch::{self, Fetched, Mirror, Options, Patience, What};
 use crate::simulate;
+use crate::storage::{self, File};
 
 /// Download the images of a sequence, or what the first text release has of it.
 ///
@@ -140,7 +140,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     if let Some(note) = note {
         writeln!(stdout, "Note: {note}")?;
     }
-    writeln!(stdout, "{}: {}", fetched.into.display(), text::bytes(text::size_on_disk(&fetched.into)))?;
+    writeln!(stdout, "{}: {}", fetched.into.display(), text::bytes(storage::size(&fetched.into)))?;
     writeln!(stdout, "next: {}", next.join(" "))?;
     Ok(Outcome::Done)
 }
@@ -172,7 +172,7 @@ fn quoted(word: &str) -> String {
 /// The recipe of a name, or in a file.
 fn recipe_of(name: &str) -> anyhow::Result<Recipe> {
     let path = Path::new(name);
-    if path.is_dir() || (!path.exists() && path.extension().is_none()) {
+    if storage::is_folder(path) || (!storage::exists(path) && path.extension().is_none()) {
         if simulate::names().contains(&name) {
             anyhow::bail!(
                 "{name} is simulated, there is nothing to download: `os simulate {name} -o {name}.mcap` makes it"

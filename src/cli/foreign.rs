@@ -1,9 +1,9 @@
 //! Graphs and problems of other programs, told from sequences by their name and their first words.
 
-use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
+use crate::storage::{self, File};
 use anyhow::{Context, bail};
 
 /// Bytes of a file that are looked at.
@@ -43,7 +43,7 @@ impl Foreign {
 ///
 /// Fails for one that is compressed, saying what unpacks it.
 pub(super) fn of(input: &Path) -> anyhow::Result<Option<Foreign>> {
-    if !input.is_file() {
+    if !storage::is_file(input) {
         return Ok(None);
     }
     let file = File::open(input).with_context(|| input.display().to_string())?;

@@ -1,6 +1,5 @@
 //! `os import`: a graph or a model of another program as a sequence.
 
-use std::fs::File;
 use std::io::{self, BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 
@@ -15,6 +14,7 @@ use crate::exchange::{
     ImportNames, Imported, from_bal, from_colmap, from_g2o, read_bal, read_colmap, read_g2o,
 };
 use crate::format::{self, WriteOptions};
+use crate::storage::{self, File};
 use crate::structure::{SourceFile, hex};
 
 /// The files of a COLMAP model.
@@ -63,7 +63,7 @@ enum Format {
 
 pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome> {
     refuse_input(&args.input, &args.output)?;
-    if !args.force && args.output.symlink_metadata().is_ok() {
+    if !args.force && storage::is_taken(&args.output)? {
         return Err(format::Error::Exists { path: args.output.clone() }.into());
     }
     let from = match args.from {
@@ -96,7 +96,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         count(sequence.graph_points.len()),
         count(sequence.graph_factors.len()),
         args.graph,
-        text::bytes(text::size_on_disk(&args.output))
+        text::bytes(storage::size(&args.output))
     )?;
     Ok(outcome)
 }
@@ -149,8 +149,8 @@ pub(super) fn name(given: Option<&str>, input: &Path) -> anyhow::Result<String> 
     let name = if let Some(name) = given {
         name.to_owned()
     } else {
-        let path = input.canonicalize()?;
-        let name = if path.is_dir() { path.file_name() } else { path.file_stem() };
+        let path = if storage::is_url(input) { input.to_owned() } else { input.canonicalize()? };
+        let name = if storage::is_folder(&path) { path.file_name() } else { path.file_stem() };
         name.unwrap_or_default().to_string_lossy().into_owned()
     };
     if name.is_empty() || name.chars().any(|letter| "/\\".contains(letter) || letter.is_control()) {
@@ -161,12 +161,12 @@ pub(super) fn name(given: Option<&str>, input: &Path) -> anyhow::Result<String> 
 
 /// The format of an input, by its name and its first words.
 fn guess(input: &Path) -> anyhow::Result<Format> {
-    if input.is_dir() {
+    if storage::is_folder(input) {
         let files = COLMAP_FILES;
-        if files.iter().all(|name| input.join(name).is_file()) {
+        if files.iter().all(|name| storage::is_file(&input.join(name))) {
             return Ok(Format::Colmap);
         }
-        let hint = if input.join("cameras.bin").is_file() {
+        let hint = if storage::is_file(&input.join("cameras.bin")) {
             "; `colmap model_converter --output_type TXT` makes them of a binary model"
         } else {
             ""

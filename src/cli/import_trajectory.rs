@@ -1,6 +1,5 @@
 //! `os import-trajectory`: a path that another system estimated becomes an estimate of the sequence.
 
-use std::fs::File;
 use std::io::{self, BufReader, Write};
 use std::path::PathBuf;
 
@@ -9,6 +8,7 @@ use clap::ValueEnum;
 
 use super::{Outcome, extended, text};
 use crate::exchange::{MatchBy, MatchOptions, match_trajectory};
+use crate::storage::File;
 use crate::structure::{Estimate, TrajectoryFormat, read_trajectory};
 
 /// Import the path that another system estimated, as an estimate of the sequence.

@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::{Outcome, text};
 use crate::format::{self, SequenceReader};
+use crate::storage;
 use crate::structure::{Camera, Frame, Manifest, Noise, TrajectoryPose};
 
 /// Show what is in a sequence: origin, cameras, frames, tables, noise, what was recovered or left out.
@@ -74,7 +75,7 @@ fn info<'a>(reader: &'a SequenceReader, frames: &[Frame]) -> anyhow::Result<Info
     Ok(Info {
         path: reader.path().display().to_string(),
         encoding: reader.encoding().name(),
-        bytes: text::size_on_disk(reader.path()),
+        bytes: storage::size(reader.path()),
         frame_count: frames.len(),
         frames_with_truth: frames.iter().filter(|frame| frame.world_from_camera().is_some()).count(),
         duration_seconds: span as f64 * 1e-9,

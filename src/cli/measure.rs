@@ -15,6 +15,7 @@ use crate::format::{
     self, Chunk, Realisation, SequenceReader, SequenceWriter, WriteOptions, write_realisations,
 };
 use crate::simulate::noise::{NoiseModel, NoiseRecipe};
+use crate::storage;
 use crate::structure::{
     FrameBundle, GraphFactor, GraphLine, GraphPoint, GraphPose, LineLandmark, LineMeasurement,
     LineObservation, Manifest, MapLine, MapPoint, PointLandmark, PointMeasurement, PointObservation, Record,
@@ -202,7 +203,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
             path.display(),
             text::count(points),
             text::count(lines),
-            text::bytes(text::size_on_disk(path))
+            text::bytes(storage::size(path))
         )?;
     }
     Ok(outcome)
@@ -258,7 +259,7 @@ fn complete_depths(
             text::count(done.line_ends as u64),
             text::count(done.triangulated as u64),
             text::count(done.without as u64),
-            text::bytes(text::size_on_disk(path))
+            text::bytes(storage::size(path))
         )?;
         if done.without > 0 {
             outcome = Outcome::Findings;
@@ -283,12 +284,11 @@ fn completed(table: &str, rows: usize) -> Recovery {
 
 /// Refuses what could not be written in the end, before any work.
 fn check_outputs(outputs: &[(u64, PathBuf)], args: &Args) -> anyhow::Result<()> {
-    let input = args.sequence.canonicalize()?;
     for (_, path) in outputs {
-        if path.symlink_metadata().is_err() {
+        if !storage::is_taken(path).with_context(|| path.display().to_string())? {
             continue;
         }
-        if path.canonicalize().is_ok_and(|path| input.starts_with(path)) {
+        if storage::holds(path, &args.sequence) {
             anyhow::bail!("{}: is the input itself, or holds it", path.display());
         }
         if !args.force {

@@ -17,6 +17,7 @@ use crate::format::Partial;
 use crate::plot::ViewFrom;
 use crate::plot::paper::{Look, PaperFigure};
 use crate::simulate::{self, Recipe};
+use crate::storage;
 use crate::structure::Manifest;
 
 /// Draw a figure for a paper, as SVG, PDF or PNG: scenes, measurements, statistics, trajectories, errors, convergence.
@@ -208,7 +209,7 @@ impl Args {
         match (self.figure, named, self.inputs.as_slice()) {
             (Some(figure), _, inputs) => (figure, inputs),
             (None, Some(figure), [_, inputs @ ..]) if !inputs.is_empty() => (figure, inputs),
-            (None, Some(figure), [first]) if !first.exists() => {
+            (None, Some(figure), [first]) if !storage::exists(first) => {
                 let words = format!("{}: expected a sequence after the figure's name", figure.name());
                 program().error(ErrorKind::MissingRequiredArgument, words).exit()
             }

@@ -11,6 +11,7 @@ use super::progress::Progress;
 use crate::format::Partial;
 use crate::simulate::Simulation;
 use crate::simulate::render::{Layout, RenderOptions, Rendered, render};
+use crate::storage;
 
 /// What a rendered folder may hold; a folder with anything else is not replaced.
 const MEMBERS: [&str; 10] = [
@@ -65,7 +66,7 @@ impl RawArgs {
     /// Where one stands there that is not to be replaced, or is not a rendering.
     pub(super) fn target(&self, force: bool) -> anyhow::Result<Option<&Path>> {
         let Some(folder) = self.render_to.as_deref() else { return Ok(None) };
-        if folder.symlink_metadata().is_ok() {
+        if storage::is_taken(folder)? {
             if !force {
                 anyhow::bail!("{} exists; --force replaces it", folder.display());
             }
@@ -108,12 +109,11 @@ impl RawArgs {
 
 /// Whether a folder holds nothing but what a rendering holds.
 fn is_rendering(folder: &Path) -> std::io::Result<bool> {
-    if !folder.is_dir() {
+    if !storage::is_folder(folder) {
         return Ok(false);
     }
-    for entry in fs::read_dir(folder)? {
-        let name = entry?.file_name();
-        let name = name.to_string_lossy();
+    for entry in storage::list(folder, &[])? {
+        let name = entry.name.to_string_lossy();
         let known =
             MEMBERS.contains(&&*name) || name.ends_with(".gt.freiburg") || name.starts_with("scene_00_");
         if !known {

@@ -10,6 +10,7 @@ use super::progress::Stages;
 use super::{Outcome, evaluate_output, plot, text};
 use crate::format::Partial;
 use crate::report::{Report, ReportOptions};
+use crate::storage;
 
 /// Show sequences and results as one HTML file: scene, frames, statistics, errors, convergence, findings.
 ///
@@ -54,7 +55,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     drop(stages);
     fs::write(partial.path(), report.html()?).with_context(|| output.display().to_string())?;
     partial.finish()?;
-    let size = fs::metadata(output).map_or(0, |found| found.len());
+    let size = storage::size(output);
     writeln!(stdout, "{}: {}", output.display(), text::bytes(size))?;
     Ok(if report.has_findings() { Outcome::Findings } else { Outcome::Done })
 }

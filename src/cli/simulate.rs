@@ -1,6 +1,5 @@
 //! `os simulate`: a sequence out of a recipe.
 
-use std::fs::File;
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
@@ -11,6 +10,7 @@ use super::{Outcome, render, text};
 use crate::datasets;
 use crate::format::{Encoding, Outline, WriteOptions, Written, write_two_pass};
 use crate::simulate::{self, Expected, MAX_RECIPE_BYTES, Recipe, Simulation};
+use crate::storage::{self, File};
 
 /// Simulate a sequence: a scene, a path through it, what each frame sees, and noise.
 ///
@@ -90,12 +90,12 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         text::count(found.point_observations),
         text::count(found.line_observations),
         text::count(rows),
-        text::bytes(text::size_on_disk(output))
+        text::bytes(storage::size(output))
     )?;
     if let Some((raw, (partial, rendered))) = raw.zip(rendered) {
         partial.finish()?;
         let (width, height) = (rendered.width, rendered.height);
-        let (frames, size) = (text::count(rendered.frames as u64), text::bytes(text::size_on_disk(raw)));
+        let (frames, size) = (text::count(rendered.frames as u64), text::bytes(storage::size(raw)));
         writeln!(
             stdout,
             "{}: pictures and depth maps of {frames} frames, {width} x {height} px, {size}",
@@ -141,7 +141,7 @@ fn write(simulation: &Simulation, output: &Path, options: WriteOptions) -> anyho
 
 /// Ends before the work where the output is not to be replaced.
 fn refuse_existing(output: &Path, force: bool) -> anyhow::Result<()> {
-    if !force && output.exists() {
+    if !force && storage::is_taken(output)? {
         anyhow::bail!("{} exists; --force replaces it", output.display());
     }
     Ok(())
@@ -150,7 +150,7 @@ fn refuse_existing(output: &Path, force: bool) -> anyhow::Result<()> {
 /// A recipe, and the folder in which names of files in it start.
 fn recipe_of(name: &str) -> anyhow::Result<(Recipe, PathBuf)> {
     let path = Path::new(name);
-    if path.is_dir() || (!path.exists() && path.extension().is_none()) {
+    if storage::is_folder(path) || (!storage::exists(path) && path.extension().is_none()) {
         if datasets::names().contains(&name) {
             anyhow::bail!(
                 "{name} is not simulated, it comes from images: `os fetch {name}` gets them and says how to convert them"

@@ -1,8 +1,5 @@
 //! Small pieces of text that several commands print.
 
-use std::fs;
-use std::path::Path;
-
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 
 /// A table without frame, its numbers to the right; as wide as it needs to be.
@@ -50,22 +47,6 @@ pub(super) fn bytes(number: u64) -> String {
         size /= 1000.0;
     }
     format!("{size:.1} TB")
-}
-
-/// Bytes that a sequence takes on disk.
-pub(super) fn size_on_disk(path: &Path) -> u64 {
-    let size = |path: &Path| fs::metadata(path).map_or(0, |found| found.len());
-    match fs::read_dir(path) {
-        Ok(entries) => entries
-            .flatten()
-            .map(|entry| {
-                // A link to a folder is not followed.
-                let is_folder = entry.file_type().is_ok_and(|kind| kind.is_dir());
-                if is_folder { size_on_disk(&entry.path()) } else { size(&entry.path()) }
-            })
-            .sum(),
-        Err(_) => size(path),
-    }
 }
 
 #[cfg(test)]

@@ -1,57 +1,53 @@
 //! A file read at any place, by any number of readers, with the bytes counted.
 
-use std::fs::File;
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
 
 use bytes::Bytes;
 use parquet::errors::{ParquetError, Result as ParquetResult};
 use parquet::file::reader::{ChunkReader, Length};
 
 use super::Error;
+use crate::storage::Source;
 
 /// A shared file; clones read independently of each other.
 #[derive(Clone, Debug)]
 pub(super) struct CountedFile {
-    file: Arc<Mutex<File>>,
+    source: Arc<Source>,
     path: Arc<PathBuf>,
-    length: u64,
     bytes_read: Arc<AtomicU64>,
 }
 
 impl CountedFile {
     /// Opens a file; `bytes_read` is added to by every read.
     pub(super) fn open(path: &Path, bytes_read: Arc<AtomicU64>) -> Result<Self, Error> {
-        let file = File::open(path).map_err(Error::io(path))?;
-        let length = file.metadata().map_err(Error::io(path))?.len();
-        Ok(Self { file: Arc::new(Mutex::new(file)), path: Arc::new(path.to_owned()), length, bytes_read })
+        let source = Source::open(path).map_err(Error::io(path))?;
+        Ok(Self { source: Arc::new(source), path: Arc::new(path.to_owned()), bytes_read })
     }
 
     pub(super) fn path(&self) -> &Path {
         &self.path
     }
 
-    pub(super) const fn length(&self) -> u64 {
-        self.length
+    pub(super) fn length(&self) -> u64 {
+        self.source.length()
     }
 
     /// Reads some bytes at a place; fewer at the end of the file.
     pub(super) fn read_at(&self, offset: u64, buffer: &mut [u8]) -> io::Result<usize> {
-        let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
-        file.seek(SeekFrom::Start(offset))?;
-        let read = file.read(buffer)?;
+        let read = self.source.read_at(offset, buffer)?;
         self.bytes_read.fetch_add(read as u64, Ordering::Relaxed);
         Ok(read)
     }
 
     /// Reads exactly `length` bytes; refuses before allocating when the file is shorter.
     pub(super) fn read_exact_at(&self, offset: u64, length: usize) -> io::Result<Vec<u8>> {
-        if offset.checked_add(length as u64).is_none_or(|end| end > self.length) {
+        if offset.checked_add(length as u64).is_none_or(|end| end > self.length()) {
             return Err(io::Error::new(
                 io::ErrorKind::UnexpectedEof,
-                format!("{length} bytes at {offset} reach beyond the file's {} bytes", self.length),
+                format!("{length} bytes at {offset} reach beyond the file's {} bytes", self.length()),
             ));
         }
         let mut buffer = vec![0; length];
@@ -68,7 +64,7 @@ impl CountedFile {
 
 impl Length for CountedFile {
     fn len(&self) -> u64 {
-        self.length
+        self.length()
     }
 }
 

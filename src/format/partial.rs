@@ -4,6 +4,7 @@ use std::fs::File;
 use std::path::Path;
 
 use super::Error;
+use crate::storage::{self, Found};
 use crate::unfinished::Unfinished;
 
 pub use crate::unfinished::discard as discard_unfinished;
@@ -18,10 +19,10 @@ pub(crate) struct Partial {
 impl Partial {
     /// Reserves the place; refuses when something stands there and `force` is not given, and always what is neither file nor folder.
     pub(crate) fn new(target: &Path, force: bool) -> Result<Self, Error> {
-        if !force && target.symlink_metadata().is_ok() {
+        if !force && storage::is_taken(target).map_err(Error::io(target))? {
             return Err(Error::Exists { path: target.to_owned() });
         }
-        if target.metadata().is_ok_and(|found| !found.is_file() && !found.is_dir()) {
+        if storage::find(target).is_ok_and(|found| found == Found::Other) {
             return Err(not_replaced(target, "a file or a folder", "a device or the like"));
         }
         Ok(Self { unfinished: Unfinished::beside(target).map_err(Error::io(target))?, force })
@@ -30,7 +31,7 @@ impl Partial {
     /// As [`Partial::new`], for a file: refuses a folder.
     pub(crate) fn file(target: &Path, force: bool) -> Result<Self, Error> {
         let partial = Self::new(target, force)?;
-        if target.is_dir() {
+        if storage::is_folder(target) {
             return Err(not_replaced(target, "a file", "a folder"));
         }
         Ok(partial)
@@ -43,13 +44,14 @@ impl Partial {
         is_member: impl Fn(&str) -> bool,
     ) -> Result<Self, Error> {
         let partial = Self::new(target, force)?;
-        if target.is_file() {
+        let found = storage::find(target);
+        if matches!(found, Ok(Found::File(_))) {
             return Err(not_replaced(target, "a folder", "a file"));
         }
-        if target.is_dir() {
-            for entry in target.read_dir().map_err(Error::io(target))? {
-                let name = entry.map_err(Error::io(target))?.file_name();
-                let name = name.to_string_lossy();
+        if matches!(found, Ok(Found::Folder)) {
+            // Over HTTP nothing can be listed, and nothing but the new files is touched.
+            for entry in storage::list(target, &[]).map_err(Error::io(target))? {
+                let name = entry.name.to_string_lossy();
                 if !is_member(&name) {
                     return Err(not_replaced(
                         target,
@@ -80,7 +82,7 @@ impl Partial {
     /// Gives the output its final name; what stood there before goes only now.
     pub(crate) fn finish(self) -> Result<(), Error> {
         let target = self.unfinished.target().to_owned();
-        if !self.force && target.symlink_metadata().is_ok() {
+        if !self.force && storage::is_taken(&target).map_err(Error::io(&target))? {
             return Err(Error::Exists { path: target });
         }
         self.unfinished.finish().map_err(Error::io(&target))

@@ -1,7 +1,6 @@
 //! Reading a sequence from either encoding: whole tables, frame after frame, or one frame by id or time.
 
 use std::collections::{BTreeMap, VecDeque};
-use std::fs;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -16,6 +15,7 @@ use super::parquet_reader::{ParquetTableReader, check_rows};
 use super::record_batches::RecordBatches;
 use super::stored_table::StoredTable;
 use super::{Error, names};
+use crate::storage::{self, Found};
 use crate::structure::{
     Frame, FrameBundle, FrameId, LineMeasurement, LineObservation, Manifest, PointMeasurement,
     PointObservation, Record, Sequence, TABLES, TableInfo, for_each_frame_table, for_each_table, table_info,
@@ -72,8 +72,8 @@ pub fn read(path: impl AsRef<Path>) -> Result<Sequence, Error> {
 impl SequenceReader {
     fn open(path: &Path) -> Result<Self, Error> {
         let bytes_read = Arc::new(AtomicU64::new(0));
-        let found = fs::metadata(path).map_err(Error::io(path))?;
-        let (manifest, backend, passed_over) = if found.is_dir() {
+        let found = storage::find(path).map_err(Error::io(path))?;
+        let (manifest, backend, passed_over) = if found == Found::Folder {
             let manifest = parse_manifest(path)?;
             let (tables, passed_over, mut damaged) = open_tables(path, &bytes_read)?;
             if !damaged.is_empty() {
@@ -113,7 +113,7 @@ impl SequenceReader {
     /// [`Error::Container`] and the like when the container gives access to nothing.
     pub(crate) fn open_lenient(path: &Path) -> Result<(Self, Damaged), Error> {
         let bytes_read = Arc::new(AtomicU64::new(0));
-        let (backend, passed_over, damaged) = if path.is_dir() {
+        let (backend, passed_over, damaged) = if storage::is_folder(path) {
             let (tables, passed_over, damaged) = open_tables(path, &bytes_read)?;
             (Backend::Parquet(tables), passed_over, damaged)
         } else {
@@ -421,8 +421,8 @@ type OpenedTables = (BTreeMap<&'static str, ParquetTableReader>, Vec<String>, Da
 /// The bytes of a folder's manifest.
 fn read_manifest(path: &Path) -> Result<Vec<u8>, Error> {
     let manifest_path = path.join(names::MANIFEST_FILE);
-    let found = match fs::metadata(&manifest_path) {
-        Ok(found) if found.is_file() => found,
+    let bytes = match storage::find(&manifest_path) {
+        Ok(Found::File(bytes)) => bytes,
         Ok(_) => {
             return Err(Error::NotASequence {
                 path: path.to_owned(),
@@ -437,15 +437,15 @@ fn read_manifest(path: &Path) -> Result<Vec<u8>, Error> {
         }
         Err(error) => return Err(Error::io(&manifest_path)(error)),
     };
-    if found.len() > MAX_MANIFEST_BYTES {
+    if bytes > MAX_MANIFEST_BYTES {
         return Err(Error::TooLarge {
             path: manifest_path,
             what: "manifest size".to_owned(),
-            found: found.len(),
+            found: bytes,
             limit: MAX_MANIFEST_BYTES,
         });
     }
-    fs::read(&manifest_path).map_err(Error::io(&manifest_path))
+    storage::read(&manifest_path).map_err(Error::io(&manifest_path))
 }
 
 fn parse_manifest(path: &Path) -> Result<Manifest, Error> {
@@ -455,17 +455,18 @@ fn parse_manifest(path: &Path) -> Result<Manifest, Error> {
 
 fn open_tables(path: &Path, bytes_read: &Arc<AtomicU64>) -> Result<OpenedTables, Error> {
     let (mut tables, mut passed_over, mut damaged) = (BTreeMap::new(), Vec::new(), Vec::new());
-    for entry in fs::read_dir(path).map_err(Error::io(path))? {
-        let entry = entry.map_err(Error::io(path))?;
-        let file_name = entry.file_name();
-        let name = file_name.to_string_lossy();
+    let tables_known: Vec<String> = TABLES.iter().map(|table| format!("{}.parquet", table.name)).collect();
+    let known: Vec<&str> = tables_known.iter().map(String::as_str).collect();
+    for entry in storage::list(path, &known).map_err(Error::io(path))? {
+        let name = entry.name.to_string_lossy();
+        let file = path.join(&entry.name);
         match name.strip_suffix(".parquet").and_then(table_info) {
-            Some(table) if !entry.path().is_file() => {
+            Some(table) if !matches!(entry.found, Found::File(_)) => {
                 let detail = "not a regular file".to_owned();
-                let error = Error::Container { path: entry.path(), container: "Parquet", detail };
+                let error = Error::Container { path: file, container: "Parquet", detail };
                 damaged.push((table, error));
             }
-            Some(table) => match ParquetTableReader::open(&entry.path(), table, Arc::clone(bytes_read)) {
+            Some(table) => match ParquetTableReader::open(&file, table, Arc::clone(bytes_read)) {
                 Ok(reader) => {
                     tables.insert(table.name, reader);
                 }

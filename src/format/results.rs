@@ -12,6 +12,7 @@ use parquet::basic::{Compression, ZstdLevel};
 use parquet::file::properties::WriterProperties;
 
 use super::Error;
+use super::counted_file::CountedFile;
 use super::partial::Partial;
 use crate::structure::{ResultTable, ResultValues};
 
@@ -84,7 +85,7 @@ pub fn read_results(path: &Path) -> Result<ResultTable, Error> {
     use crate::structure::ResultColumn;
 
     let container = |detail: String| Error::Container { path: path.to_owned(), container: "Parquet", detail };
-    let file = std::fs::File::open(path).map_err(Error::io(path))?;
+    let file = CountedFile::open(path, Arc::default())?;
     let builder =
         ParquetRecordBatchReaderBuilder::try_new(file).map_err(|cause| container(cause.to_string()))?;
     let schema = Arc::clone(builder.schema());

@@ -1,12 +1,12 @@
 //! What an input of a report is: a sequence, or what another command wrote.
 
-use std::fs::{self, File};
 use std::io::Read as _;
 use std::path::Path;
 
 use super::error::Error;
 use super::json_results::Results;
 use crate::format;
+use crate::storage::{self, File, Found};
 
 /// Largest JSON file that is read.
 const MOST_JSON_BYTES: u64 = 1 << 26;
@@ -28,14 +28,14 @@ impl Input {
     /// Looks at a path; reads it if it holds results.
     pub(super) fn of(path: &Path) -> Result<Self, Error> {
         let io = |cause| Error::Io { path: path.to_owned(), cause };
-        let found = fs::metadata(path).map_err(io)?;
-        if found.is_dir() {
-            if path.join(MANIFEST).exists() || !path.join(SUMMARY).is_file() {
+        let found = storage::find(path).map_err(io)?;
+        if found == Found::Folder {
+            if storage::exists(&path.join(MANIFEST)) || !storage::is_file(&path.join(SUMMARY)) {
                 return Ok(Self::Sequence);
             }
             let summary = format::read_results(&path.join(SUMMARY))?;
             let curves = path.join(CURVES);
-            let curves = curves.is_file().then(|| format::read_results(&curves)).transpose()?;
+            let curves = storage::is_file(&curves).then(|| format::read_results(&curves)).transpose()?;
             return Ok(Self::Results(Box::new(Results::of_tables(path, &summary, curves.as_ref())?)));
         }
         let mut file = File::open(path).map_err(io)?;
@@ -48,8 +48,8 @@ impl Input {
         if !is_json || path.file_name().is_some_and(|name| name == MANIFEST) {
             return Ok(Self::Sequence);
         }
-        if found.len() > MOST_JSON_BYTES {
-            let found = format!("{} bytes of JSON, over {MOST_JSON_BYTES}", found.len());
+        if file.length() > MOST_JSON_BYTES {
+            let found = format!("{} bytes of JSON, over {MOST_JSON_BYTES}", file.length());
             return Err(Error::UnknownInput { path: path.to_owned(), found });
         }
         file.take(MOST_JSON_BYTES).read_to_end(&mut begin).map_err(io)?;

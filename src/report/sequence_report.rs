@@ -1,6 +1,5 @@
 //! Everything that a page shows of one sequence.
 
-use std::fs;
 use std::path::Path;
 
 use super::comparison::{Comparison, Tables};
@@ -14,6 +13,7 @@ use crate::evaluate::EvaluateOptions;
 use crate::format::{self, SequenceReader};
 use crate::plot::{self, Scene, ViewFrom};
 use crate::statistics::{Analysed, Analysis, Counted};
+use crate::storage;
 use crate::structure::{
     Frame, GraphLine, GraphPoint, Iteration, LineLandmark, LineMeasurement, Manifest, MapLine, MapPoint,
     PointLandmark, PointMeasurement, StructuralGroup, TrajectoryPose,
@@ -121,11 +121,11 @@ impl SequenceReport {
         let mut validation = validate::validate(path, &rules)?;
         // The same page wherever the file lies.
         validation.path = None;
-        let name = if path.is_dir() { path.file_name() } else { path.file_stem() };
+        let name = if storage::is_folder(path) { path.file_name() } else { path.file_stem() };
         Ok(Self {
             file: name.map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned()),
             encoding: reader.encoding().name(),
-            bytes: size_on_disk(path),
+            bytes: storage::size(path),
             runs: Run::of(&reader.table::<Iteration>()?),
             manifest,
             frames,
@@ -169,14 +169,4 @@ fn pass(
         }
     }
     Ok((analysis.finish(), gathered))
-}
-
-/// Bytes of a file, or of the files right in a folder.
-fn size_on_disk(path: &Path) -> u64 {
-    let size =
-        |path: &Path| fs::metadata(path).ok().filter(fs::Metadata::is_file).map_or(0, |found| found.len());
-    match fs::read_dir(path) {
-        Ok(entries) => entries.flatten().map(|entry| size(&entry.path())).sum(),
-        Err(_) => size(path),
-    }
 }

@@ -1,7 +1,6 @@
 //! From a recipe to a sequence.
 
 use std::collections::HashMap;
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -16,6 +15,7 @@ use super::survey::{SeenLine, Survey};
 use super::visibility::{Occluders, Places, View};
 use super::{Density, Error, Recipe};
 use crate::geometry::Segment;
+use crate::storage::{self, File, Found};
 use crate::structure::{
     Camera, Clock, Frame, FrameBundle, FrameId, Generator, GroupId, LineId, LineLandmark, LineObservation,
     Manifest, PointId, PointLandmark, PointObservation, PoseRow, Source, SourceFile, StructuralGroup, hex,
@@ -124,9 +124,9 @@ pub fn simulate(
 
 /// A file that the recipe names, with its size and digest.
 fn source_file(name: &Path, folder: &Path) -> Result<SourceFile, Error> {
-    let path = folder.join(name);
+    let path = storage::named(folder, name);
     let io = |source| Error::Io { path: path.clone(), source };
-    if !path.metadata().map_err(io)?.is_file() {
+    if !matches!(storage::find(&path).map_err(io)?, Found::File(_)) {
         let found = "a folder or a device".to_owned();
         return Err(Error::Content { path, line: None, expected: "a file".to_owned(), found });
     }

@@ -4,7 +4,10 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
+
+use crate::storage;
 
 /// Temporary names that are in use, for [`discard`].
 static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
@@ -18,7 +21,7 @@ pub fn discard() {
     for path in unfinished.iter() {
         // Other threads go on writing: a file that appears in a folder while it is emptied keeps it from going.
         // Nothing more can be done about a temporary file that cannot be removed.
-        let _ = (0..100).find(|_| remove(path).is_ok());
+        let _ = (0..100).find(|_| storage::remove(path).is_ok());
     }
     // Never unlocked.
     std::mem::forget(unfinished);
@@ -35,15 +38,20 @@ pub(crate) struct Unfinished {
 }
 
 impl Unfinished {
-    /// Reserves a temporary name; the folder that it lies in is made where it is missing.
+    /// Reserves a temporary name; the folder that it lies in is made where it is missing. What a URL is to name lies in
+    /// this machine's temporary folder until it is finished.
     pub(crate) fn beside(target: &Path) -> io::Result<Self> {
         let name = target
             .file_name()
             .ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "the output has no file name"))?;
-        let parent =
-            target.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        fs::create_dir_all(parent)?;
-        let temporary = parent.join(format!(".{}.{}.partial", name.to_string_lossy(), std::process::id()));
+        let parent = storage::workshop(target)?;
+        let mut own = std::process::id().to_string();
+        if storage::is_url(target) {
+            // There outputs of other folders meet under one name.
+            static NUMBER: AtomicU64 = AtomicU64::new(0);
+            own = format!("{own}-{}", NUMBER.fetch_add(1, Ordering::Relaxed));
+        }
+        let temporary = parent.join(format!(".{}.{own}.partial", name.to_string_lossy()));
         UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).insert(temporary.clone());
         Ok(Self { target: target.to_owned(), temporary, finished: false })
     }
@@ -60,12 +68,16 @@ impl Unfinished {
 
     /// Makes the temporary folder, empty.
     pub(crate) fn create_folder(&self) -> io::Result<()> {
-        remove(&self.temporary)?;
+        storage::remove(&self.temporary)?;
         fs::create_dir(&self.temporary)
     }
 
     /// Gives the output its final name; what stands there goes only now.
     pub(crate) fn finish(mut self) -> io::Result<()> {
+        if storage::is_url(&self.target) {
+            // What was made here goes when this value does.
+            return storage::send(&self.temporary, &self.target);
+        }
         let occupied = self.target.symlink_metadata().is_ok();
         if occupied && (self.target.is_dir() || self.temporary.is_dir()) {
             // A folder cannot be renamed over another: the old one steps aside first.
@@ -74,7 +86,7 @@ impl Unfinished {
             fs::rename(&self.temporary, &self.target).inspect_err(|_| {
                 let _ = fs::rename(&aside, &self.target);
             })?;
-            remove(&aside)?;
+            storage::remove(&aside)?;
         } else {
             fs::rename(&self.temporary, &self.target)?;
         }
@@ -83,20 +95,11 @@ impl Unfinished {
     }
 }
 
-fn remove(path: &Path) -> io::Result<()> {
-    match path.symlink_metadata() {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-        Err(error) => Err(error),
-        Ok(found) if found.is_dir() => fs::remove_dir_all(path),
-        Ok(_) => fs::remove_file(path),
-    }
-}
-
 impl Drop for Unfinished {
     fn drop(&mut self) {
         if !self.finished {
             // Nothing more can be done about a temporary file that cannot be removed.
-            let _ = remove(&self.temporary);
+            let _ = storage::remove(&self.temporary);
         }
         UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).remove(&self.temporary);
     }

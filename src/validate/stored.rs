@@ -1,7 +1,6 @@
 //! From a path to its report: opening, the manifest, what is there, then every table.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
 use std::path::Path;
 
 use super::finding::{Detail, Findings};
@@ -13,13 +12,14 @@ use super::source::Source;
 use super::tables::{Progress, Shared, damaged};
 use super::{Error, Options, container};
 use crate::format::{self, Encoding, McapSurvey, SequenceReader, survey_file};
+use crate::storage::{self, Found};
 use crate::structure::registry::SPEC_VERSION;
 use crate::structure::{Sequence, Storage, TABLES, TableInfo, TableSummary, for_each_table};
 
 /// Validates what stands at a path.
 pub(crate) fn validate(path: &Path, options: &Options<'_>) -> Result<Report, Error> {
     let io = |cause| Error::Io { path: path.to_owned(), cause };
-    let found = fs::metadata(path).map_err(io)?;
+    let found = storage::find(path).map_err(io)?;
     let folder = path
         .file_name()
         .is_some_and(|name| name == "sequence.json")
@@ -27,11 +27,11 @@ pub(crate) fn validate(path: &Path, options: &Options<'_>) -> Result<Report, Err
     let mut findings = Findings::new(options.listed);
     let mut subject = Subject { path: Some(path.display().to_string()), ..Subject::default() };
     let target = folder.unwrap_or(path);
-    if found.is_dir() || folder.is_some() {
+    if found == Found::Folder || folder.is_some() {
         subject.encoding = Some(Encoding::Parquet.name());
-        fs::read_dir(target).map_err(io)?;
-    } else if found.is_file() {
-        fs::File::open(path).map_err(io)?;
+        storage::list(target, &[]).map_err(io)?;
+    } else if matches!(found, Found::File(_)) {
+        storage::File::open(path).map_err(io)?;
     } else {
         findings.add(RuleId::ContainerReadable, None, || {
             Detail::new("an .mcap file or a folder with sequence.json", "neither a file nor a folder")

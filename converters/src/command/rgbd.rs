@@ -13,8 +13,8 @@ use clap::builder::PossibleValuesParser;
 use open_structure::datasets::{self, CameraOfDataset, Dataset, Recipe};
 use open_structure::format::{self, Encoding, WriteOptions};
 use open_structure::simulate::noise::{NoiseModel, NoiseRecipe};
+use open_structure::storage::{self, File};
 use serde::Serialize;
-use std::fs::File;
 use std::io::{Read as _, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -145,7 +145,7 @@ impl Args {
         let Some(name) = &self.recipe else { return Ok(None) };
         let path = Path::new(name);
         // A name of ours goes before a folder of that name, such as one that was fetched.
-        if path.extension().is_none() && !path.is_file() {
+        if path.extension().is_none() && !storage::is_file(path) {
             return Ok(Some(datasets::named(name)?));
         }
         Ok(Some(Recipe::from_toml(&text_of(path)?).with_context(|| name.clone())?))
@@ -235,7 +235,7 @@ pub fn run(
         )?;
         return Ok(Outcome::Misused);
     }
-    if !args.force && output.symlink_metadata().is_ok() {
+    if !args.force && storage::is_taken(output).with_context(|| output.display().to_string())? {
         return Err(format::Error::Exists { path: output.clone() }.into());
     }
     if let Some(what) = replaced(input, output) {
@@ -306,13 +306,13 @@ pub fn run(
 
 /// What of the input an output would take the place of, if any.
 fn replaced(input: &Path, output: &Path) -> Option<&'static str> {
-    let (input, found) = (input.canonicalize().ok()?, output.canonicalize().ok()?);
-    if input.starts_with(&found) {
+    if storage::holds(output, input) {
         return Some("the input itself, or holds it");
     }
-    let is_sequence = found.join("sequence.json").is_file()
-        || (found.is_file() && Encoding::of_output(&found) == Encoding::Mcap);
-    (found.starts_with(&input) && !is_sequence).then_some("a part of the input")
+    let is_sequence = storage::is_file(&output.join("sequence.json"))
+        || (storage::is_file(output) && Encoding::of_output(output) == Encoding::Mcap);
+    (storage::exists(output) && storage::holds(input, output) && !is_sequence)
+        .then_some("a part of the input")
 }
 
 /// Draws some frames.

@@ -8,6 +8,7 @@ use crate::text_release::{Limits, SequenceSource, TextSequence, discover, read};
 use anyhow::Context as _;
 use open_structure::format::{self, Encoding, WriteOptions};
 use open_structure::geometry::PinholeCamera;
+use open_structure::storage::{self, Local};
 use rayon::prelude::*;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -95,7 +96,11 @@ fn parse_camera(text: &str) -> Result<PinholeCamera, String> {
 /// Where nothing can be found to convert, or a report cannot be printed. A sequence that fails is told and counted.
 pub fn run(args: &Args, stdout: &mut dyn Write, stderr: &mut dyn Write) -> anyhow::Result<Outcome> {
     let limits = Limits::default();
-    let found = discover(&args.paths, &limits)?;
+    // What URLs name is copied here first.
+    let local = |path: &PathBuf| Local::of(path, &[]).with_context(|| path.display().to_string());
+    let inputs: Vec<Local> = args.paths.iter().map(local).collect::<anyhow::Result<_>>()?;
+    let paths: Vec<PathBuf> = inputs.iter().map(|input| input.path().to_owned()).collect();
+    let found = discover(&paths, &limits)?;
     let sources = &found.sequences;
     let places = match places(args, sources) {
         Ok(places) => places,
@@ -184,8 +189,8 @@ fn places(args: &Args, sources: &[SequenceSource]) -> Result<Vec<(PathBuf, Encod
             output.with_extension("").display()
         ));
     }
-    if output.is_file() || output.join("sequence.json").exists() {
-        let what = if output.is_file() { "is a file" } else { "is a sequence" };
+    if storage::is_file(output) || storage::exists(&output.join("sequence.json")) {
+        let what = if storage::is_file(output) { "is a file" } else { "is a sequence" };
         return Err(format!(
             "{}: {what}, and {} sequences were found; give another folder",
             output.display(),
@@ -213,7 +218,7 @@ fn one(
     progress: &Progress,
 ) -> anyhow::Result<Summary> {
     // Known before the work is done, and looked at again when the output gets its name.
-    if !args.force && output.symlink_metadata().is_ok() {
+    if !args.force && storage::is_taken(output).with_context(|| output.display().to_string())? {
         return Err(format::Error::Exists { path: output.to_owned() }.into());
     }
     progress.stage(&source.name, "reading");

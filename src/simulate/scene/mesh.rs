@@ -1,7 +1,6 @@
 //! Triangle meshes from OBJ and PLY files.
 
 use std::collections::HashMap;
-use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
@@ -15,6 +14,7 @@ use super::edges::creases;
 use super::placement::check_numbers;
 use super::{Face, MAX_FACES, Placement, Scene};
 use crate::simulate::Error;
+use crate::storage::{self, File, Found};
 
 /// Largest mesh file that is read.
 const MAX_BYTES: u64 = 2 << 30;
@@ -71,7 +71,7 @@ impl Mesh {
     }
 
     pub(super) fn add_to(&self, scene: &mut Scene, object: u32, folder: &Path) -> Result<(), Error> {
-        let path = folder.join(&self.file);
+        let path = storage::named(folder, &self.file);
         let soup = read(&path)?;
         let content = |expected: &str, found: String| Error::Content {
             path: path.clone(),
@@ -120,22 +120,19 @@ impl Mesh {
 
 fn read(path: &Path) -> Result<Soup, Error> {
     let io = |source| Error::Io { path: path.to_owned(), source };
-    let file = File::open(path).map_err(io)?;
     let content = |line: Option<usize>, expected: &str, found: String| Error::Content {
         path: path.to_owned(),
         line,
         expected: expected.to_owned(),
         found,
     };
-    let found = file.metadata().map_err(io)?;
-    if !found.is_file() {
+    let Found::File(bytes) = storage::find(path).map_err(io)? else {
         return Err(content(None, "an OBJ or PLY file", "a folder or a device".to_owned()));
-    }
-    let bytes = found.len();
+    };
     if bytes > MAX_BYTES {
         return Err(content(None, "a mesh of at most 2 GiB", format!("{bytes} bytes")));
     }
-    let mut reader = BufReader::new(file.take(MAX_BYTES));
+    let mut reader = BufReader::new(File::open(path).map_err(io)?.take(MAX_BYTES));
     let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
     match extension.as_deref() {
         Some("obj") => read_obj(&mut reader).map_err(|found| content(None, "an OBJ file", found)),

@@ -1,6 +1,5 @@
 //! A path that a trajectory file holds.
 
-use std::fs;
 use std::io::BufReader;
 use std::path::{Path as FilePath, PathBuf};
 
@@ -10,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::{TimedPose, stamp_nanos};
 use crate::geometry::Pose;
 use crate::simulate::Error;
+use crate::storage::{self, Found};
 use crate::structure::{
     LARGEST_TRAJECTORY_FILE_BYTES, PoseRow, TrajectoryFileError, TrajectoryFormat, TrajectoryRow,
     read_trajectory,
@@ -40,7 +40,7 @@ impl File {
     pub(super) fn poses(&self, rate_hz: f64, folder: &FilePath) -> Result<Vec<TimedPose>, Error> {
         let world_from_file = transform("trajectory.world_from_file", self.world_from_file)?;
         let body_from_camera = transform("trajectory.body_from_camera", self.body_from_camera)?;
-        let path = folder.join(&self.file);
+        let path = storage::named(folder, &self.file);
         self.rows(&path)?
             .into_iter()
             .enumerate()
@@ -60,15 +60,14 @@ impl File {
     fn rows(&self, path: &FilePath) -> Result<Vec<TrajectoryRow>, Error> {
         let io = |source| Error::Io { path: path.to_owned(), source };
         let content = |line, expected, found| Error::Content { path: path.to_owned(), line, expected, found };
-        let about = fs::metadata(path).map_err(io)?;
-        if !about.is_file() {
+        let Found::File(bytes) = storage::find(path).map_err(io)? else {
             return Err(content(None, "a file".to_owned(), "something else".to_owned()));
-        }
-        if about.len() > LARGEST_TRAJECTORY_FILE_BYTES {
+        };
+        if bytes > LARGEST_TRAJECTORY_FILE_BYTES {
             let expected = format!("a file of at most {LARGEST_TRAJECTORY_FILE_BYTES} bytes");
-            return Err(content(None, expected, format!("{} bytes", about.len())));
+            return Err(content(None, expected, format!("{bytes} bytes")));
         }
-        let input = BufReader::new(fs::File::open(path).map_err(io)?);
+        let input = BufReader::new(storage::File::open(path).map_err(io)?);
         read_trajectory(input, self.format).map_err(|error| match error {
             TrajectoryFileError::Io(source) => io(source),
             TrajectoryFileError::Content { line, expected, found } => content(line, expected, found),

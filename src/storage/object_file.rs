@@ -1,0 +1,109 @@
+//! An object that is read in blocks, the last ones kept.
+
+use std::fs;
+use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::sync::{Mutex, PoisonError};
+
+use bytes::Bytes;
+
+use super::object::Object;
+
+/// Bytes that are fetched at once: about what a network delivers in the time that a request takes.
+const BLOCK: u64 = 1 << 20;
+/// Blocks that are kept: each column of a table is read at a place of its own.
+const KEPT: usize = 32;
+
+/// An object that is open for reading.
+#[derive(Debug)]
+pub(super) struct ObjectFile {
+    object: Object,
+    length: u64,
+    /// Tells this state of the object from another.
+    tag: Option<String>,
+    /// Blocks by number, the one used last at the end.
+    blocks: Mutex<Vec<(u64, Bytes)>>,
+    /// The whole object, where the server gives no parts.
+    whole: Mutex<Option<fs::File>>,
+}
+
+impl ObjectFile {
+    pub(super) fn open(object: Object) -> io::Result<Self> {
+        let (length, tag) = object.state()?;
+        Ok(Self { object, length, tag, blocks: Mutex::default(), whole: Mutex::default() })
+    }
+
+    pub(super) const fn length(&self) -> u64 {
+        self.length
+    }
+
+    /// Reads some bytes at a place; fewer at the end of a block or of the object.
+    pub(super) fn read_at(&self, offset: u64, buffer: &mut [u8]) -> io::Result<usize> {
+        if offset >= self.length || buffer.is_empty() {
+            return Ok(0);
+        }
+        if let Some(whole) = self.whole.lock().unwrap_or_else(PoisonError::into_inner).as_mut() {
+            whole.seek(SeekFrom::Start(offset))?;
+            return whole.read(buffer);
+        }
+        let number = offset / BLOCK;
+        let block = match self.kept(number) {
+            Some(block) => block,
+            None => match self
+                .object
+                .range(number * BLOCK..(number + 1).saturating_mul(BLOCK).min(self.length), &self.tag)
+            {
+                Ok(block) => self.keep(number, block),
+                Err(error) if error.kind() == io::ErrorKind::Unsupported => {
+                    self.fetch_whole()?;
+                    return self.read_at(offset, buffer);
+                }
+                Err(error) => return Err(error),
+            },
+        };
+        let rest = block.get((offset - number * BLOCK) as usize..).unwrap_or_default();
+        if rest.is_empty() {
+            return Err(io::Error::new(
+                io::ErrorKind::UnexpectedEof,
+                "the store gave fewer bytes than were asked for",
+            ));
+        }
+        let read = rest.len().min(buffer.len());
+        buffer[..read].copy_from_slice(&rest[..read]);
+        Ok(read)
+    }
+
+    fn kept(&self, number: u64) -> Option<Bytes> {
+        let mut blocks = self.blocks.lock().unwrap_or_else(PoisonError::into_inner);
+        let place = blocks.iter().position(|(kept, _)| *kept == number)?;
+        let block = blocks.remove(place);
+        let bytes = block.1.clone();
+        blocks.push(block);
+        Some(bytes)
+    }
+
+    fn keep(&self, number: u64, block: Bytes) -> Bytes {
+        let mut blocks = self.blocks.lock().unwrap_or_else(PoisonError::into_inner);
+        if blocks.len() == KEPT {
+            blocks.remove(0);
+        }
+        blocks.push((number, block.clone()));
+        block
+    }
+
+    /// Copies the object to this machine; the copy goes with its last reader.
+    fn fetch_whole(&self) -> io::Result<()> {
+        let mut whole = self.whole.lock().unwrap_or_else(PoisonError::into_inner);
+        if whole.is_none() {
+            let mut file = tempfile::tempfile()?;
+            self.object.fetch(&mut |part| file.write_all(part))?;
+            if file.metadata()?.len() != self.length {
+                return Err(io::Error::new(
+                    io::ErrorKind::UnexpectedEof,
+                    "the object changed while it was read",
+                ));
+            }
+            *whole = Some(file);
+        }
+        Ok(())
+    }
+}

@@ -49,7 +49,8 @@ use clap::{CommandFactory, Parser, Subcommand};
 /// Measurements instead of images: tools for Open-Structure sequences.
 ///
 /// A sequence is an MCAP file (NAME.mcap) or a Parquet folder (NAME/ with sequence.json). Every
-/// command reads both; the name of an output decides which is written.
+/// command reads both; the name of an output decides which is written. Paths may be URLs: s3://,
+/// gs://, http:// and https://.
 #[derive(Parser, Debug)]
 #[command(
     name = "os",

@@ -12,12 +12,13 @@ use std::path::{Path, PathBuf};
 const ROOMS: &[(&str, &[&str])] = &[
     ("geometry", &[]),
     ("structure", &["geometry"]),
-    ("unfinished", &[]),
+    ("storage", &[]),
+    ("unfinished", &["storage"]),
     ("archive", &["unfinished"]),
     ("datasets", &["structure"]),
     ("fetch", &["structure", "unfinished", "archive", "datasets"]),
-    ("format", &["geometry", "structure", "unfinished"]),
-    ("simulate", &["geometry", "structure"]),
+    ("format", &["geometry", "structure", "storage", "unfinished"]),
+    ("simulate", &["geometry", "structure", "storage"]),
     ("track", &["geometry", "structure"]),
     ("adjust", &["geometry", "structure"]),
     ("statistics", &["geometry", "structure"]),
@@ -33,6 +34,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "format",
             "simulate",
             "datasets",
+            "storage",
             "unfinished",
             "track",
             "covisibility",
@@ -41,8 +43,8 @@ const ROOMS: &[(&str, &[&str])] = &[
             "plot",
         ],
     ),
-    ("validate", &["geometry", "structure", "format", "simulate", "track", "adjust", "evaluate"]),
-    ("report", &["geometry", "structure", "format", "statistics", "plot", "evaluate", "validate"]),
+    ("validate", &["geometry", "structure", "storage", "format", "simulate", "track", "adjust", "evaluate"]),
+    ("report", &["geometry", "structure", "storage", "format", "statistics", "plot", "evaluate", "validate"]),
     (
         "cli",
         &[
@@ -63,6 +65,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "benchmark",
             "validate",
             "report",
+            "storage",
         ],
     ),
 ];
@@ -73,6 +76,11 @@ const LIBRARIES: &[(&[&str], &[&str], &str)] = &[
         &["arrow", "parquet", "mcap", "foxglove"],
         &["src/format/"],
         "files are the business of the room `format`",
+    ),
+    (
+        &["object_store", "reqwest", "tokio", "futures_util", "rustls"],
+        &["src/storage/"],
+        "where files lie is the business of the room `storage`",
     ),
     (
         &["krilla", "krilla_svg", "resvg", "ttf_parser"],

@@ -95,6 +95,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         ..Options::default()
     };
     let into = args.output.clone().unwrap_or_else(|| PathBuf::from(&recipe.name));
+    storage::on_this_machine(&into).with_context(|| into.display().to_string())?;
     let progress = FetchProgress::default();
     let fetched = fetch::fetch(&recipe, &into, &options, &|event| progress.show(&event))?;
     drop(progress);

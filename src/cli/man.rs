@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use anyhow::Context;
 
 use super::{Outcome, program};
+use crate::storage::on_this_machine;
 
 /// Write man pages: one for the program and one for each command.
 #[derive(clap::Args, Debug)]
@@ -28,6 +29,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         stdout.write_all(&page)?;
         return Ok(Outcome::Done);
     };
+    on_this_machine(folder).with_context(|| format!("{}", folder.display()))?;
     fs::create_dir_all(folder).with_context(|| format!("{}", folder.display()))?;
     clap_mangen::generate_to(command, folder).with_context(|| format!("{}", folder.display()))?;
     Ok(Outcome::Done)

@@ -1,6 +1,5 @@
 //! The part of `os simulate` that renders raw RGB-D data.
 
-use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 

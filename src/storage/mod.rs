@@ -56,6 +56,20 @@ pub fn is_url(path: &Path) -> bool {
     scheme(path).is_some()
 }
 
+/// A path of this machine; refuses a URL, where there is no way to write one.
+///
+/// # Errors
+/// [`io::ErrorKind::InvalidInput`] for a URL.
+pub fn on_this_machine(path: &Path) -> io::Result<&Path> {
+    if is_url(path) {
+        return Err(io::Error::new(
+            io::ErrorKind::InvalidInput,
+            "expected a folder on this machine, found a URL",
+        ));
+    }
+    Ok(path)
+}
+
 /// The scheme of a URL and what follows it.
 fn scheme(path: &Path) -> Option<(&'static str, &str)> {
     let (before, rest) = path.to_str()?.split_once(":/")?;

@@ -15,7 +15,7 @@ const KEPT: usize = 32;
 
 /// An object that is open for reading.
 #[derive(Debug)]
-pub(super) struct ObjectFile {
+pub(crate) struct ObjectFile {
     object: Object,
     length: u64,
     /// Tells this state of the object from another.

@@ -324,7 +324,9 @@ fn pictures(
     count: usize,
     progress: &generate::Progress<'_>,
 ) -> anyhow::Result<()> {
-    std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    storage::on_this_machine(folder)
+        .and_then(std::fs::create_dir_all)
+        .with_context(|| folder.display().to_string())?;
     let frames = generated.frames();
     let count = count.min(frames.len());
     for number in 0..count {

@@ -75,7 +75,7 @@ fn scheme(path: &Path) -> Option<(&'static str, &str)> {
     let (before, rest) = path.to_str()?.split_once(":/")?;
     let scheme = SCHEMES.into_iter().find(|scheme| *scheme == before)?;
     // Paths put together may have lost a slash.
-    Some((scheme, rest.trim_start_matches('/')))
+    Some((scheme, rest.strip_prefix('/').unwrap_or(rest)))
 }
 
 /// What stands at a place, links followed.

@@ -112,9 +112,9 @@ impl Object {
     }
 
     /// Some bytes of it, of the state that a tag tells.
-    pub(super) fn range(&self, range: Range<u64>, tag: &Option<String>) -> io::Result<Bytes> {
+    pub(super) fn range(&self, range: Range<u64>, tag: Option<&str>) -> io::Result<Bytes> {
         // A weak tag promises too little to be asked for.
-        let tag = tag.clone().filter(|tag| !tag.starts_with("W/"));
+        let tag = tag.filter(|tag| !tag.starts_with("W/")).map(str::to_owned);
         let options = GetOptions { range: Some(range.into()), if_match: tag, ..GetOptions::default() };
         wait(async { self.store.get_opts(&self.key, options).await?.bytes().await })
     }

@@ -8,10 +8,12 @@ use bytes::Bytes;
 
 use super::object::Object;
 
-/// Bytes that are fetched at once: about what a network delivers in the time that a request takes.
-const BLOCK: u64 = 1 << 20;
+/// Bytes of a block: about what a network delivers in the time that a request takes.
+const BLOCK: u64 = 1 << 18;
+/// Blocks that are fetched at once by who reads on from block to block.
+const AHEAD: u64 = 8;
 /// Blocks that are kept: each column of a table is read at a place of its own.
-const KEPT: usize = 32;
+const KEPT: usize = 16 * AHEAD as usize;
 
 /// An object that is open for reading.
 #[derive(Debug)]
@@ -46,19 +48,12 @@ impl ObjectFile {
             return whole.read(buffer);
         }
         let number = offset / BLOCK;
-        let block = match self.kept(number) {
-            Some(block) => block,
-            None => match self
-                .object
-                .range(number * BLOCK..(number + 1).saturating_mul(BLOCK).min(self.length), &self.tag)
-            {
-                Ok(block) => self.keep(number, block),
-                Err(error) if error.kind() == io::ErrorKind::Unsupported => {
-                    self.fetch_whole()?;
-                    return self.read_at(offset, buffer);
-                }
-                Err(error) => return Err(error),
-            },
+        let block = match self.kept(number).map_or_else(|| self.fetch(number), Ok) {
+            Err(error) if error.kind() == io::ErrorKind::Unsupported => {
+                self.fetch_whole()?;
+                return self.read_at(offset, buffer);
+            }
+            block => block?,
         };
         let rest = block.get((offset - number * BLOCK) as usize..).unwrap_or_default();
         if rest.is_empty() {
@@ -81,13 +76,22 @@ impl ObjectFile {
         Some(bytes)
     }
 
-    fn keep(&self, number: u64, block: Bytes) -> Bytes {
+    /// Fetches a block, and some behind it where the one before was read.
+    fn fetch(&self, number: u64) -> io::Result<Bytes> {
+        let reads_on = number > 0 && self.kept(number - 1).is_some();
+        let count = if reads_on { AHEAD } else { 1 };
+        let end = (number + count).saturating_mul(BLOCK).min(self.length);
+        let fetched = self.object.range(number * BLOCK..end, self.tag.as_deref())?;
         let mut blocks = self.blocks.lock().unwrap_or_else(PoisonError::into_inner);
-        if blocks.len() == KEPT {
-            blocks.remove(0);
+        for (place, start) in (0..fetched.len()).step_by(BLOCK as usize).enumerate() {
+            let block = fetched.slice(start..fetched.len().min(start + BLOCK as usize));
+            if blocks.len() == KEPT {
+                blocks.remove(0);
+            }
+            blocks.push((number + place as u64, block));
         }
-        blocks.push((number, block.clone()));
-        block
+        drop(blocks);
+        Ok(fetched.slice(..fetched.len().min(BLOCK as usize)))
     }
 
     /// Copies the object to this machine; the copy goes with its last reader.

@@ -14,6 +14,10 @@ use open_structure::structure::{FrameId, PointMeasurement, Sequence};
 use server::{Kind, Server};
 use tempfile::TempDir;
 
+/// A key of Google's that needs nobody's signature.
+const GOOGLE_KEY: &str =
+    r#"{"private_key": "", "private_key_id": "", "client_email": "", "disable_oauth": true}"#;
+
 /// A store, and by which URLs it is spoken to.
 struct Store {
     server: Server,
@@ -48,7 +52,7 @@ impl Store {
                 .env("AWS_ACCESS_KEY_ID", "someone")
                 .env("AWS_SECRET_ACCESS_KEY", "something")
                 .env("AWS_REGION", "here"),
-            "gs" => command.env("GOOGLE_BASE_URL", endpoint).env("GOOGLE_SKIP_SIGNATURE", "true"),
+            "gs" => command.env("GOOGLE_BASE_URL", endpoint).env("GOOGLE_SERVICE_ACCOUNT_KEY", GOOGLE_KEY),
             _ => &mut command,
         };
         command.output().unwrap()
@@ -57,7 +61,8 @@ impl Store {
     fn done(&self, folder: &Path, arguments: &[&str]) -> String {
         let output = self.os(folder, arguments);
         let words = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success(), "{} {arguments:?}: {words}", self.scheme);
+        // Be it with findings.
+        assert!(matches!(output.status.code(), Some(0 | 3)), "{} {arguments:?}: {words}", self.scheme);
         String::from_utf8(output.stdout).unwrap()
     }
 
@@ -80,7 +85,7 @@ fn folder() -> TempDir {
         .unwrap();
     assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
     format::write(
-        folder.path().join("box1.mcap"),
+        &folder.path().join("box1.mcap"),
         &read(&folder.path().join("box1")),
         WriteOptions::default(),
     )
@@ -149,7 +154,7 @@ fn only_what_is_read_is_fetched() {
     let at = folder.path();
     // Longer than a few blocks of a reader.
     let mut sequence = read(&at.join("box1"));
-    let longest = 40;
+    let longest = 120;
     let rows = std::mem::take(&mut sequence.point_measurements);
     let frames = std::mem::take(&mut sequence.frames);
     let beyond = frames.last().unwrap().frame_id.0 + 1;
@@ -164,8 +169,8 @@ fn only_what_is_read_is_fetched() {
             row
         }));
     }
-    format::write(at.join("long"), &sequence, WriteOptions::default()).unwrap();
-    format::write(at.join("long.mcap"), &sequence, WriteOptions::default()).unwrap();
+    format::write(&at.join("long"), &sequence, WriteOptions::default()).unwrap();
+    format::write(&at.join("long.mcap"), &sequence, WriteOptions::default()).unwrap();
     for store in Store::all() {
         store.server.keep_folder("bucket/long", &at.join("long"));
         store.server.keep("bucket/long.mcap", fs::read(at.join("long.mcap")).unwrap());
@@ -177,7 +182,7 @@ fn only_what_is_read_is_fetched() {
             let found = rows(&store.url(name));
             let sent = store.server.sent();
             assert!(!found.is_empty() && found == rows(name));
-            assert!(whole > 8 << 20 && sent < whole / 2, "{} {name}: {sent} bytes of {whole}", store.scheme);
+            assert!(whole > 8 << 20 && sent < whole / 4, "{} {name}: {sent} bytes of {whole}", store.scheme);
         }
         // Larger than a part of an upload.
         store.done(at, &["copy", "long.mcap", "-o", &store.url("again.mcap")]);
@@ -243,14 +248,13 @@ fn everything_that_has_a_path_may_have_a_url() {
     let at = folder.path();
     for store in Store::all() {
         let url = |key: &str| store.url(key);
-        let recipe = "name = \"poses\"\nseed = 1\n".to_owned() + "[camera]\nfamily = \"simulated\"\n";
-        // Recipes, and the files that they name.
+        // Recipes.
         let box1 =
             fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("sequences/box1.toml")).unwrap();
         store.server.keep("bucket/box1.toml", box1.into_bytes());
-        drop(recipe);
         store.done(at, &["simulate", &url("box1.toml"), "-o", &url("made.mcap"), "--force"]);
-        assert!(store.server.objects()["bucket/made.mcap"] == fs::read(at.join("box1.mcap")).unwrap());
+        store.done(at, &["simulate", "box1", "-o", "made.mcap", "--force"]);
+        assert!(store.server.objects()["bucket/made.mcap"] == fs::read(at.join("made.mcap")).unwrap());
         // From measurements to figures.
         store.done(
             at,
@@ -338,45 +342,16 @@ fn a_benchmark_goes_on_where_it_was_cut_off() {
     let objects = store.server.objects();
     let cells: Vec<&String> = objects.keys().filter(|key| key.contains("results/cells/")).collect();
     assert_eq!(cells.len(), 1, "{objects:?}");
-    assert!(objects["bucket/results/summary.parquet"] == fs::read(at.join("local/summary.parquet")).unwrap());
+    let table = |path: &str| {
+        let mut table = format::read_results(&at.join(path)).unwrap();
+        table.columns.retain(|column| column.name != "seconds");
+        table
+    };
+    fs::write(at.join("fetched.parquet"), &objects["bucket/results/summary.parquet"]).unwrap();
+    assert_eq!(table("fetched.parquet"), table("local/summary.parquet"));
     store.server.asked();
     run(&results);
     assert!(!store.server.asked().iter().any(|line| line.starts_with("PUT") && line.contains("/cells/")));
-}
-
-#[test]
-fn datasets_are_copied_before_they_are_converted() {
-    let Some(converter) = open_structure_converters_binary() else { return };
-    let folder = folder();
-    let at = folder.path();
-    let store = &Store::all()[0];
-    let sample = Path::new(env!("CARGO_MANIFEST_DIR")).join("sequences/sample");
-    store.server.keep_folder("bucket/sample", &sample);
-    let convert = |input: &str, output: &str| {
-        let output = Command::new(&converter)
-            .current_dir(at)
-            .args(["open-structure", input, "-o", output])
-            .env("AWS_ENDPOINT_URL", format!("http://{}", store.server.address))
-            .env("AWS_ACCESS_KEY_ID", "someone")
-            .env("AWS_SECRET_ACCESS_KEY", "something")
-            .output()
-            .unwrap();
-        let words = String::from_utf8_lossy(&output.stderr);
-        assert!(matches!(output.status.code(), Some(0 | 3)), "{words}");
-    };
-    convert(sample.to_str().unwrap(), "local.mcap");
-    convert("s3://bucket/sample", "s3://bucket/converted.mcap");
-    assert!(store.server.objects()["bucket/converted.mcap"] == fs::read(at.join("local.mcap")).unwrap());
-}
-
-/// `os-convert`, where it was built beside `os`.
-fn open_structure_converters_binary() -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_BIN_EXE_os")).with_file_name("os-convert");
-    if !path.is_file() {
-        eprintln!("SKIPPED: no os-convert beside os");
-        return None;
-    }
-    Some(path)
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! A store on this machine: what S3 and Google's XML interface and plain HTTP have in common, and what they have not.
 
 use std::collections::BTreeMap;
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{BufRead, BufReader, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::Path;
 use std::sync::{Arc, Mutex};
@@ -12,7 +12,7 @@ use sha2::{Digest, Sha256};
 
 /// What a store keeps to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub(crate) enum Kind {
     /// Buckets: listing, parts, many removals at once.
     Buckets,
     /// Files as a server of static pages has them, but they can be put; folders show a page for people.
@@ -32,8 +32,8 @@ struct State {
 
 /// A store on threads of its own.
 #[derive(Clone)]
-pub struct Server {
-    pub address: String,
+pub(crate) struct Server {
+    pub(crate) address: String,
     state: Arc<Mutex<State>>,
 }
 
@@ -52,7 +52,7 @@ struct Response {
 }
 
 impl Server {
-    pub fn new(kind: Kind) -> Self {
+    pub(crate) fn new(kind: Kind) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let server = Self { address: listener.local_addr().unwrap().to_string(), state: Arc::default() };
         let state = Arc::clone(&server.state);
@@ -67,12 +67,12 @@ impl Server {
     }
 
     /// Puts an object without asking the network.
-    pub fn keep(&self, key: &str, bytes: Vec<u8>) {
+    pub(crate) fn keep(&self, key: &str, bytes: Vec<u8>) {
         self.state.lock().unwrap().objects.insert(key.to_owned(), bytes);
     }
 
     /// Puts all files of a folder.
-    pub fn keep_folder(&self, key: &str, folder: &Path) {
+    pub(crate) fn keep_folder(&self, key: &str, folder: &Path) {
         for entry in folder.read_dir().unwrap() {
             let entry = entry.unwrap();
             let key = format!("{key}/{}", entry.file_name().to_string_lossy());
@@ -85,27 +85,27 @@ impl Server {
     }
 
     /// Answers what begins so with 403.
-    pub fn forbid(&self, prefix: &str) {
+    pub(crate) fn forbid(&self, prefix: &str) {
         self.state.lock().unwrap().forbidden.push(prefix.to_owned());
     }
 
     /// Keys and objects.
-    pub fn objects(&self) -> BTreeMap<String, Vec<u8>> {
+    pub(crate) fn objects(&self) -> BTreeMap<String, Vec<u8>> {
         self.state.lock().unwrap().objects.clone()
     }
 
     /// What was asked since the last time, as `METHOD key`.
-    pub fn asked(&self) -> Vec<String> {
+    pub(crate) fn asked(&self) -> Vec<String> {
         std::mem::take(&mut self.state.lock().unwrap().asked)
     }
 
     /// Bytes of objects that were sent since the last time.
-    pub fn sent(&self) -> u64 {
+    pub(crate) fn sent(&self) -> u64 {
         std::mem::take(&mut self.state.lock().unwrap().sent)
     }
 
     /// Uploads in parts that were begun and neither completed nor given up.
-    pub fn left_open(&self) -> usize {
+    pub(crate) fn left_open(&self) -> usize {
         self.state.lock().unwrap().uploads.len()
     }
 }

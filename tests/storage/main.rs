@@ -272,7 +272,7 @@ fn everything_that_has_a_path_may_have_a_url() {
         store.done(at, &["track", &url("measured.mcap"), "-o", &url("tracked")]);
         store.done(at, &["graph", &url("tracked"), "-o", &url("graph.mcap"), "--estimate", "map-to-frame"]);
         store.done(at, &["adjust", &url("graph.mcap"), "-o", &url("adjusted.mcap")]);
-        assert!(store.done(at, &["evaluate", &url("adjusted.mcap")]).contains("structural-ba"));
+        assert!(store.done(at, &["evaluate", &url("adjusted.mcap")]).contains("-ba"));
         assert!(store.done(at, &["stats", &url("adjusted.mcap")]).contains("447"));
         // Files of others, in and out.
         store.done(

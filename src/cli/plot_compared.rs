@@ -121,8 +121,8 @@ fn stacked(
 
 /// A path for each estimate, coloured by its errors.
 fn ape_maps(wanted: &Wanted<'_>, all: &[Compared]) -> anyhow::Result<Vec<Panel>> {
-    let found: Vec<(&Compared, Vec<(&ComparedEstimate, &Absolute<FrameId>)>)> =
-        all.iter().map(|compared| Ok((compared, compared.absolute()?))).collect::<anyhow::Result<_>>()?;
+    let with_errors = |compared| -> anyhow::Result<_> { Ok((compared, Compared::absolute(compared)?)) };
+    let found: Vec<_> = all.iter().map(with_errors).collect::<anyhow::Result<_>>()?;
     let largest: Vec<f64> = found
         .iter()
         .flat_map(|(_, estimates)| estimates.iter().map(|(_, absolute)| largest(absolute)))

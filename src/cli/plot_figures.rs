@@ -89,13 +89,12 @@ pub(super) fn statistics(wanted: &Wanted<'_>) -> anyhow::Result<PaperFigure> {
     Ok(PaperFigure { title: of_inputs(title, wanted), panels, columns })
 }
 
+/// A curve's name, its role, and its number in a frame.
+type Column<'a> = (&'a str, Role, fn(&FrameStatistics) -> Option<f64>);
+
 /// A chart over the frames of a sequence.
-fn over_frames(
-    frames: &[FrameStatistics],
-    y_name: &str,
-    columns: [(&str, Role, fn(&FrameStatistics) -> Option<f64>); 2],
-) -> Content {
-    let curve = |(name, role, number): (&str, Role, fn(&FrameStatistics) -> Option<f64>)| Curve {
+fn over_frames(frames: &[FrameStatistics], y_name: &str, columns: [Column<'_>; 2]) -> Content {
+    let curve = |(name, role, number): Column<'_>| Curve {
         name: name.to_owned(),
         role,
         places: frames

@@ -211,12 +211,11 @@ pub(super) fn frame_ids(text: &str) -> Result<FrameIds, String> {
     };
     let range = |part: &str| -> Result<Range<i64>, String> {
         let number = |text: &str| text.trim().parse::<i64>().map_err(|_| wrong(part));
-        let range = match part.split_once("..") {
-            Some((first, last)) => number(first)?..number(last)?,
-            None => {
-                let id = number(part)?;
-                id..id.checked_add(1).ok_or_else(|| wrong(part))?
-            }
+        let range = if let Some((first, last)) = part.split_once("..") {
+            number(first)?..number(last)?
+        } else {
+            let id = number(part)?;
+            id..id.checked_add(1).ok_or_else(|| wrong(part))?
         };
         if range.is_empty() { Err(wrong(part)) } else { Ok(range) }
     };
@@ -230,7 +229,7 @@ mod tests {
     #[test]
     fn frames_are_ids_and_ranges() {
         assert_eq!(frame_ids("0,10, 100..105").unwrap().0, [0..1, 10..11, 100..105]);
-        assert_eq!(frame_ids("-3").unwrap().0, [-3..-2]);
+        assert_eq!(frame_ids("-3,4").unwrap().0, [-3..-2, 4..5]);
         for wrong in ["", "a", "5..5", "7..3", "1,,2", "1..", "9223372036854775807"] {
             assert!(frame_ids(wrong).is_err(), "{wrong}");
         }

@@ -30,7 +30,7 @@ pub(super) struct Chunk {
 pub(super) struct Component {
     archetype: &'static str,
     field: &'static str,
-    component_type: &'static str,
+    kind: &'static str,
     values: ArrayRef,
 }
 
@@ -94,11 +94,8 @@ impl Component {
     }
 
     #[expect(clippy::unnecessary_wraps, reason = "the end of a chain of those that may fail")]
-    fn new(
-        [archetype, field, component_type]: [&'static str; 3],
-        values: ArrayRef,
-    ) -> Result<Self, ArrowError> {
-        Ok(Self { archetype, field, component_type, values })
+    fn new([archetype, field, kind]: [&'static str; 3], values: ArrayRef) -> Result<Self, ArrowError> {
+        Ok(Self { archetype, field, kind, values })
     }
 
     fn described(&self) -> Field {
@@ -106,7 +103,7 @@ impl Component {
         let about = [
             ("rerun:archetype", format!("rerun.archetypes.{}", self.archetype)),
             ("rerun:component", name.clone()),
-            ("rerun:component_type", format!("rerun.components.{}", self.component_type)),
+            ("rerun:component_type", format!("rerun.components.{}", self.kind)),
             ("rerun:kind", "data".to_owned()),
         ];
         Field::new(name, self.values.data_type().clone(), true).with_metadata(metadata(about))

@@ -62,7 +62,7 @@ pub fn png(svg: &str, dots_per_inch: f64) -> Result<Vec<u8>, PaperError> {
     let tree = tree(svg, "PNG")?;
     let [width, height] = [tree.size().width(), tree.size().height()]
         .map(|units| (f64::from(units / UNITS_PER_INCH) * dots_per_inch).round().max(1.0));
-    if !(width.max(height) <= f64::from(MOST_PIXELS)) {
+    if ![width, height].iter().all(|pixels| *pixels <= f64::from(MOST_PIXELS)) {
         return Err(PaperError::TooLarge { width, height, most: MOST_PIXELS });
     }
     let mut pixels = Pixmap::new(width as u32, height as u32)

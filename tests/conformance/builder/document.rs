@@ -188,6 +188,10 @@ impl Cell {
         if let Self::Float(value) = self { Some(*value) } else { None }
     }
 
+    pub(crate) fn text(&self) -> Option<&str> {
+        if let Self::Text(value) = self { Some(value) } else { None }
+    }
+
     pub(crate) fn is_null(&self) -> bool {
         matches!(self, Self::Null)
     }

@@ -24,6 +24,18 @@ pub(super) fn sequences(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
     Ok(found)
 }
 
+/// As [`sequences`], where an input may also be a name.
+pub(super) fn named(names: &[String]) -> anyhow::Result<Vec<String>> {
+    let mut found = Vec::new();
+    for name in names {
+        for path in sequences(&[PathBuf::from(name)])? {
+            let path = path.into_os_string().into_string();
+            found.push(path.map_err(|path| anyhow::anyhow!("{}: a name that is no text", path.display()))?);
+        }
+    }
+    Ok(found)
+}
+
 /// What a file or folder is called, in a collection without `sequence=`.
 pub(super) fn called(path: &Path) -> Option<String> {
     let name = path.file_name()?.to_string_lossy().into_owned();

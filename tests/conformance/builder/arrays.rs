@@ -88,11 +88,9 @@ fn array(column: &Column, stored: &DataType, cells: &[&Cell]) -> ArrayRef {
                 cells.iter().map(|cell| if let Cell::Bytes(bytes) = cell { Some(bytes) } else { None });
             Arc::new(values.collect::<BinaryArray>())
         }
-        Kind::Int64List
-        | Kind::Int32List
-        | Kind::Float64List
-        | Kind::Float32List
-        | Kind::Utf8List => list(stored, cells),
+        Kind::Int64List | Kind::Int32List | Kind::Float64List | Kind::Float32List | Kind::Utf8List => {
+            list(stored, cells)
+        }
     }
 }
 

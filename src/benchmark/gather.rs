@@ -83,8 +83,8 @@ fn same_place(one: &Path, other: &Path) -> bool {
 /// Refuses a run whose columns would not be those of the first.
 fn agree(part: &Part, first: &Plan, first_folder: &Path) -> Result<(), Error> {
     let same = [
-        ("methods", part.plan.methods == first.methods),
-        ("estimates", part.plan.estimates == first.estimates),
+        ("choice of methods", part.plan.methods == first.methods),
+        ("choice of estimates", part.plan.estimates == first.estimates),
         ("noise", part.plan.noise == first.noise),
         ("choice of a bound", part.plan.bound == first.bound),
     ];

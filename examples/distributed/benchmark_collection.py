@@ -3,15 +3,17 @@
 
     python3 benchmark_collection.py all -o results --jobs jobs.txt --workers 4 -- --seeds 10
 
-The program `os` is the task, one for each sequence; Dask shares the tasks out among worker processes, on this machine or, with
---scheduler, on those of a cluster that see the same folders. What comes out is what one machine makes of
+The program `os` is the task, one for each sequence; Dask shares the tasks out among worker processes, on this
+machine or, with --scheduler, on those of a cluster that see the same folders. What comes out is what one
+machine makes of
 
     os index all && os benchmark all -o results --seeds 10
 
 to the byte in `table.md`; wall times differ.
 
-A task that fails is tried again, elsewhere where there is an elsewhere; so is one whose worker died. Programs give an output its
-name when it is whole, so that an attempt leaves all or nothing, and what is there is not made twice.
+A task that fails is tried again, elsewhere where there is an elsewhere; so is one whose worker died. Programs
+give an output its name when it is whole, so that an attempt leaves all or nothing, and what is there is not
+made twice.
 """
 
 import argparse
@@ -77,7 +79,7 @@ def make(job: Job) -> Job:
         try:
             run(job.command)
         except TaskFailed:
-            # The attempt of a worker that was given up may have come to its end meanwhile; outputs are whole or not there.
+            # The attempt of a worker that was given up may have come to its end meanwhile.
             if not output.exists():
                 raise
     return job
@@ -105,7 +107,8 @@ def settle(futures: dict[str, Future]) -> dict[str, str]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    style = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=style)
     parser.add_argument("collection", type=Path, help="folder of sequences called sequence=NAME")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder of results")
     parser.add_argument("--jobs", type=Path, help="file with NAME COMMAND… {output} … in each line")
@@ -114,12 +117,14 @@ def main() -> None:
     parser.add_argument("--retries", type=int, default=2, help="how often a task that fails is tried again")
     parser.add_argument("--program", default="os", help="the program os")
     parser.add_argument("--label", default="", help="said above the table, such as date and commit")
-    parser.add_argument("options", nargs="*", help="options of os benchmark, after --")
-    arguments = parser.parse_args()
+    parser.epilog = "What follows -- are options of os benchmark."
+    words = sys.argv[1:]
+    end = words.index("--") if "--" in words else len(words)
+    arguments, options = parser.parse_args(words[:end]), tuple(words[end + 1 :])
 
     collection, runs = arguments.collection.absolute(), arguments.output.absolute().with_suffix(".runs")
     collection.mkdir(parents=True, exist_ok=True)
-    program, options = arguments.program, tuple(arguments.options)
+    program = arguments.program
     jobs = read_jobs(arguments.jobs, collection, program) if arguments.jobs else []
     there = {job.output for job in jobs}
     for folder in sorted(collection.glob("sequence=*")):
@@ -134,9 +139,10 @@ def main() -> None:
     with Client(arguments.scheduler or cluster) as client:
         futures = {}
         for job in jobs:
-            made = client.submit(make, job, key=f"make-{job.name}", retries=arguments.retries) if job.command else job
+            tries = {"retries": arguments.retries}
+            made = client.submit(make, job, key=f"make-{job.name}", **tries) if job.command else job
             futures[job.name] = client.submit(
-                benchmark, made, program, str(runs), options, key=f"benchmark-{job.name}", retries=arguments.retries
+                benchmark, made, program, str(runs), options, key=f"benchmark-{job.name}", **tries
             )
         results = settle(futures)
     if cluster:
@@ -145,8 +151,8 @@ def main() -> None:
     print(run((program, "index", str(collection), "--force")), end="")
     # By name, as the catalogue has them.
     folders = [results[name] for name in sorted(results, key=lambda name: name.encode())]
-    gather = (program, "benchmark", "--gather", *folders, "-o", str(arguments.output), "--label", arguments.label)
-    print(run(gather, permitted=(0, 3)), end="")
+    output = ("-o", str(arguments.output), "--label", arguments.label)
+    print(run((program, "benchmark", "--gather", *folders, *output), permitted=(0, 3)), end="")
 
 
 if __name__ == "__main__":

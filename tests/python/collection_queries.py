@@ -41,11 +41,12 @@ def check_catalogue(folder: Path, wanted: dict[str, int]) -> None:
     assert duckdb.read_parquet(str(path)).to_arrow_table().to_pylist() == catalogue.to_dicts()
     joined = duckdb.sql(
         f"""SELECT c.sequence, c.frames, count(*) FROM read_parquet('{folder}/*/frames.parquet',
-            hive_partitioning = true, hive_types = {{'sequence': varchar}}) AS f JOIN '{path}' AS c USING (sequence)
-            GROUP BY ALL"""
+            hive_partitioning = true, hive_types = {{'sequence': varchar}}) AS f
+            JOIN '{path}' AS c USING (sequence) GROUP BY ALL"""
     ).fetchall()
     assert len(joined) == len(wanted) and all(frames == count for _, frames, count in joined)
-    [(name,)] = duckdb.sql(f"SELECT sequence FROM '{path}' WHERE list_contains(estimates, 'only-here')").fetchall()
+    listed = f"SELECT sequence FROM '{path}' WHERE list_contains(estimates, 'only-here')"
+    [(name,)] = duckdb.sql(listed).fetchall()
     assert name in wanted
 
 
@@ -56,8 +57,8 @@ def check_pruning(folder: Path, wanted: dict[str, int]) -> None:
     condition = f"WHERE sequence = '{one}'"
     # What the engine says of itself.
     plan = duckdb.sql(
-        f"""EXPLAIN ANALYZE SELECT sum(u) FROM read_parquet('{folder}/*/{TABLE}.parquet', hive_partitioning = true,
-            hive_types = {{'sequence': varchar}}) {condition}"""
+        f"""EXPLAIN ANALYZE SELECT sum(u) FROM read_parquet('{folder}/*/{TABLE}.parquet',
+            hive_partitioning = true, hive_types = {{'sequence': varchar}}) {condition}"""
     ).fetchall()
     text = " ".join(str(part) for row in plan for part in row)
     assert f"Scanning Files: 1/{len(wanted)}" in text and "Total Files Read: 1" in text, text
@@ -83,7 +84,8 @@ def main(folder: Path, wanted: dict[str, int]) -> None:
     assert polars_counts(polars_table(folder)) == wanted
     partitioning = ds.partitioning(flavor="hive")
     files = sorted(str(path) for path in folder.glob(f"*/{TABLE}.parquet"))
-    found = ds.dataset(files, partitioning=partitioning, partition_base_dir=str(folder)).to_table(["sequence"])
+    dataset = ds.dataset(files, partitioning=partitioning, partition_base_dir=str(folder))
+    found = dataset.to_table(["sequence"])
     counts = found.group_by("sequence").aggregate([([], "count_all")]).to_pylist()
     assert {row["sequence"]: row["count_all"] for row in counts} == wanted
     check_catalogue(folder, wanted)

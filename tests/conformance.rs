@@ -64,7 +64,7 @@ fn copy_is_equal(sequence: &Sequence, unread: &[&str], stored: Stored) -> Result
     let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
     let copy = folder.path().join(match stored {
         Stored::Mcap => Stored::Parquet.file_name(),
-        Stored::Parquet => Stored::Mcap.file_name(),
+        Stored::Parquet | Stored::Collection => Stored::Mcap.file_name(),
     });
     let failed = |error: format::Error| format!("copy: {error}");
     let written = format::write(&copy, sequence, WriteOptions::default()).map_err(failed)?;
@@ -80,10 +80,30 @@ fn copy_is_equal(sequence: &Sequence, unread: &[&str], stored: Stored) -> Result
     if back == *sequence { Ok(()) } else { Err("the copy differs".to_owned()) }
 }
 
+/// A collection's catalogue, read, is what its sequences make anew, and writing it gives it again.
+fn catalogue_is_right(path: &Path) -> Result<Result<(), String>, format::Error> {
+    let collection = format::Collection::open(path)?;
+    let made = collection.entries(None).into_iter().collect::<Result<Vec<_>, _>>()?;
+    let read = format::read_catalogue(path)?;
+    if made != read {
+        return Ok(Err(format!("{made:?} is made anew, {read:?} is read")));
+    }
+    for member in &collection.members {
+        let sequence = format::read(&member.path)?;
+        if sequence.manifest.name != member.name {
+            return Ok(Err(format!("{} holds {}", member.path.display(), sequence.manifest.name)));
+        }
+    }
+    Ok(Ok(()))
+}
+
 #[test]
 fn readers_take_valid_cases_and_their_copies_are_equal() {
     check_all("valid/", |case, stored, path| {
         let failed = |error: format::Error| error.to_string();
+        if stored == Stored::Collection {
+            return catalogue_is_right(path).map_err(failed)?;
+        }
         let reader = format::open(path).map_err(failed)?;
         let sequence = reader.read_all().map_err(failed)?;
         reader.verify_container().map_err(failed)?;
@@ -111,7 +131,12 @@ fn readers_take_valid_cases_and_their_copies_are_equal() {
 
 #[test]
 fn readers_survive_invalid_cases() {
-    check_all("invalid/", |_, _, path| {
+    check_all("invalid/", |_, stored, path| {
+        if stored == Stored::Collection {
+            let _ = format::read_catalogue(path);
+            let entries = format::Collection::open(path).map(|collection| collection.entries(None));
+            return entries.map(drop).map_err(|error| error.to_string());
+        }
         // Rows or an error, whichever; a panic or a hang would be wrong.
         if let Ok(reader) = format::open(path) {
             let _ = reader.read_all();
@@ -145,13 +170,22 @@ fn the_corpus_as_files_says_what_to_expect() {
 /// What the validator reports of a file: rule, severity and table, each once.
 type Reported = BTreeSet<(String, String, Option<String>)>;
 
-fn reported(path: &Path) -> Result<Reported, String> {
+fn reported(path: &Path, stored: Stored) -> Result<Reported, String> {
+    let mut found = Reported::new();
+    if stored == Stored::Collection {
+        // Of its sequences too, each by itself.
+        let collection = format::Collection::open(path).map_err(|error| error.to_string())?;
+        for member in collection.members {
+            found.extend(reported(&member.path, Stored::Parquet)?);
+        }
+    }
     let report =
         validate::validate(path, &validate::Options::default()).map_err(|error| error.to_string())?;
     let counted = report.rules.iter().map(|count| {
         (count.rule.to_owned(), count.severity.name().to_owned(), count.table.map(str::to_owned))
     });
-    Ok(counted.collect())
+    found.extend(counted);
+    Ok(found)
 }
 
 /// Holds what is reported against what the case expects.
@@ -187,12 +221,12 @@ fn text(table: Option<&str>) -> String {
 
 #[test]
 fn valid_cases_have_no_findings_but_the_expected_advice() {
-    check_all("valid/", |case, stored, path| compare(case, stored, &reported(path)?));
+    check_all("valid/", |case, stored, path| compare(case, stored, &reported(path, stored)?));
 }
 
 #[test]
 fn invalid_cases_show_their_defect_and_no_other() {
-    check_all("invalid/", |case, stored, path| compare(case, stored, &reported(path)?));
+    check_all("invalid/", |case, stored, path| compare(case, stored, &reported(path, stored)?));
 }
 
 #[test]

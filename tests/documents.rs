@@ -247,7 +247,10 @@ fn links_between_files_lead_somewhere() {
         ["README.md", "CONTRIBUTING.md", "benches/README.md", "converters/README.md"]
             .map(|name| root().join(name)),
     );
-    documents.extend(["sequences/README.md", "examples/plug-in/README.md"].map(|name| root().join(name)));
+    documents.extend(
+        ["sequences/README.md", "examples/plug-in/README.md", "examples/distributed/README.md"]
+            .map(|name| root().join(name)),
+    );
     let mut checked = 0;
     for document in documents {
         let text = fs::read_to_string(&document).unwrap();

@@ -43,6 +43,22 @@ pub enum Error {
         /// What differs.
         difference: String,
     },
+    /// A run cannot be put together with others.
+    #[error("{}: cannot be gathered with the others: {difference}", path.display())]
+    Apart {
+        /// Folder of the run.
+        path: PathBuf,
+        /// What keeps it apart.
+        difference: String,
+    },
+    /// No run has what the others promise.
+    #[error("{sequence}: none of the runs has its {what}")]
+    Missing {
+        /// Name of the sequence.
+        sequence: String,
+        /// What is missing.
+        what: String,
+    },
     /// Two sequences have one name.
     #[error("two sequences are called `{name}`: results would be mixed up")]
     SameName {

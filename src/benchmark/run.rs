@@ -120,6 +120,7 @@ pub fn run(
         tell(&Progress::Done { done, total });
         Ok::<(), Error>(())
     })?;
+    store.ran(plan, &kept)?;
     Ok(kept)
 }
 

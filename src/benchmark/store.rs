@@ -24,9 +24,15 @@ const CONTENTS: &str = "contents";
 struct StoredPlan {
     /// Version of the program.
     version: String,
+    /// Names of the sequences of the last run that came to its end, in order.
+    #[serde(default)]
+    sequences: Vec<String>,
     #[serde(flatten)]
     plan: Plan,
 }
+
+/// Bounds of a sequence, by method.
+pub(super) type Bounds = BTreeMap<String, Bound>;
 
 /// A folder of results.
 #[derive(Debug)]
@@ -76,8 +82,50 @@ impl Store {
                 return Err(Error::OtherPlan { path: folder.to_owned(), difference });
             }
         }
-        write(&file, &StoredPlan { version, plan: plan.clone() })?;
+        write(&file, &StoredPlan { version, sequences: Vec::new(), plan: plan.clone() })?;
         Ok(store)
+    }
+
+    /// Says that a plan was run to its end on some sequences.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub(super) fn ran(&self, plan: &Plan, sequences: &[String]) -> Result<(), Error> {
+        let version = env!("CARGO_PKG_VERSION").to_owned();
+        let stored = StoredPlan { version, sequences: sequences.to_vec(), plan: plan.clone() };
+        write(&self.folder.join(PLAN_FILE), &stored)
+    }
+
+    /// Opens the results of a run that came to its end; gives its plan and the names of its sequences.
+    ///
+    /// # Errors
+    /// [`Error::OtherPlan`] when another version of the program made them, [`Error::Stored`] when it did not come to its end,
+    /// [`Error::Io`].
+    pub(super) fn finished(folder: &Path) -> Result<(Self, Plan, Vec<String>), Error> {
+        let file = folder.join(PLAN_FILE);
+        let stored: StoredPlan = read(&file)?;
+        let version = env!("CARGO_PKG_VERSION");
+        if stored.version != version {
+            let difference = format!("of version {}, this is {version}", stored.version);
+            return Err(Error::OtherPlan { path: folder.to_owned(), difference });
+        }
+        if stored.sequences.is_empty() {
+            let detail = "expected a run that came to its end, found one without sequences".to_owned();
+            return Err(Error::Stored { path: file, detail });
+        }
+        Ok((Self { folder: folder.to_owned() }, stored.plan, stored.sequences))
+    }
+
+    /// Of what the cells of a sequence were made.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Stored`].
+    pub(super) fn content(&self, sequence: &str) -> Result<Content, Error> {
+        read(&self.content_file(sequence))
+    }
+
+    fn content_file(&self, sequence: &str) -> PathBuf {
+        self.folder.join(CONTENTS).join(format!("{}.json", file_name(sequence)))
     }
 
     /// The folder.
@@ -101,7 +149,7 @@ impl Store {
     /// [`Error::Io`], [`Error::Stored`].
     pub(super) fn expect(&self, sequence: &str, content: &Content) -> Result<bool, Error> {
         let name = file_name(sequence);
-        let path = self.folder.join(CONTENTS).join(format!("{name}.json"));
+        let path = self.content_file(sequence);
         let mut stale = Vec::new();
         let mut content = content.clone();
         if let Some(stored) = read::<Content>(&path)? {
@@ -162,7 +210,7 @@ impl Store {
     ///
     /// # Errors
     /// [`Error::Io`], [`Error::Stored`].
-    pub fn bound(&self, sequence: &str) -> Result<Option<BTreeMap<String, Bound>>, Error> {
+    pub fn bound(&self, sequence: &str) -> Result<Option<Bounds>, Error> {
         read(&self.bound_file(sequence))
     }
 
@@ -170,7 +218,7 @@ impl Store {
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn keep_bound(&self, sequence: &str, bounds: &BTreeMap<String, Bound>) -> Result<(), Error> {
+    pub fn keep_bound(&self, sequence: &str, bounds: &Bounds) -> Result<(), Error> {
         write(&self.bound_file(sequence), bounds)
     }
 }

@@ -8,7 +8,7 @@ use anyhow::Context;
 use clap::builder::PossibleValuesParser;
 
 use super::progress::Progress;
-use super::{Outcome, parsed, text};
+use super::{Outcome, inputs, parsed, text};
 use crate::benchmark::{
     self, Method, Plan, Results, Store, cells_table, curves_table, html, markdown, summary_table,
 };
@@ -37,15 +37,20 @@ const MOST_SEEDS: u64 = 1000;
 
 Examples:
   os benchmark box1 corridor1 -o results
+  os benchmark all -o results            every sequence of a collection
   os benchmark converted/* -o results --seeds 10 --label \"2026-11-22, commit 3120c7e\"
-  os benchmark box1.mcap -o results --methods map-to-frame,structural-ba --estimates my-slam")]
+  os benchmark box1.mcap -o results --methods map-to-frame,structural-ba --estimates my-slam
+  os benchmark --gather runs/* -o results   what runs on several machines found, as one table")]
 pub(super) struct Args {
-    /// Sequences: MCAP files, Parquet folders, recipes (`.toml`), or names of built-in recipes such as `box1`.
+    /// Sequences: MCAP files, Parquet folders, collections, recipes (`.toml`), or names of built-in recipes such as `box1`.
     #[arg(required = true)]
     sequences: Vec<String>,
     /// Folder of results; begun, or gone on with.
     #[arg(short, long, value_name = "FOLDER")]
     output: PathBuf,
+    /// Run nothing: the arguments are folders of results, whose sequences and seeds are put together as if one run had made them.
+    #[arg(long, conflicts_with_all = ["methods", "estimates", "seeds", "noise", "set", "no_bound", "threads"])]
+    gather: bool,
     /// Methods, in the order of the columns; all by default.
     #[arg(long, value_name = "METHOD", value_delimiter = ',', value_parser = PossibleValuesParser::new(Method::ALL.map(Method::name)))]
     methods: Vec<String>,
@@ -103,6 +108,11 @@ fn seeds(text: &str) -> Result<RangeInclusive<u64>, String> {
 }
 
 pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome> {
+    if args.gather {
+        let runs: Vec<PathBuf> = args.sequences.iter().map(PathBuf::from).collect();
+        let (store, plan, sequences) = benchmark::gather(&runs, &args.output, args.force)?;
+        return show(args, &Results::of(&sequences, &plan, &store)?, false, stdout);
+    }
     let model = NoiseModel::of_name(&args.noise).context("no such noise model")?;
     let mut noise = NoiseRecipe::new(model);
     for (name, value) in &args.set {
@@ -116,6 +126,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     let seeds = args.seeds.clone().collect();
     let plan = Plan { methods, estimates: args.estimates.clone(), seeds, noise, bound: !args.no_bound };
     let store = Store::open(&args.output, &plan, args.force)?;
+    let names = inputs::named(&args.sequences)?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads.unwrap_or(0)).build()?;
     let left_out = std::sync::atomic::AtomicBool::new(false);
     let progress = Progress::new("benchmarking", "units");
@@ -135,14 +146,20 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
             let _ = writeln!(io::stderr(), "warning: {sequence}: left out: {reason}");
         }
     };
-    let sequences = pool.install(|| benchmark::run(&args.sequences, &plan, &store, &tell))?;
+    let sequences = pool.install(|| benchmark::run(&names, &plan, &store, &tell))?;
     drop(progress);
-    let results = Results::of(&sequences, &plan, &store)?;
-    let written = write(&args.output, &results, &args.label)?;
+    show(args, &Results::of(&sequences, &plan, &store)?, left_out.into_inner(), stdout)
+}
+
+/// Writes and prints what was found.
+///
+/// * `left_out` — whether a sequence was left out.
+fn show(args: &Args, results: &Results, left_out: bool, stdout: &mut dyn Write) -> anyhow::Result<Outcome> {
+    let written = write(&args.output, results, &args.label)?;
     if args.json {
-        writeln!(stdout, "{}", serde_json::to_string_pretty(&summary_table(&results).to_json())?)?;
+        writeln!(stdout, "{}", serde_json::to_string_pretty(&summary_table(results).to_json())?)?;
     } else {
-        write!(stdout, "{}", markdown(&results, &args.label))?;
+        write!(stdout, "{}", markdown(results, &args.label))?;
         writeln!(stdout, "\n{}: {}", args.output.display(), written.join(", "))?;
     }
     let failed =
@@ -154,7 +171,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
             text::count(failed as u64)
         )?;
     }
-    let findings = failed > 0 || left_out.into_inner();
+    let findings = failed > 0 || left_out;
     Ok(if findings { Outcome::Findings } else { Outcome::Done })
 }
 

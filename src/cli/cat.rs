@@ -9,7 +9,9 @@ use serde_json::Value;
 
 use super::Outcome;
 use crate::format::{self, SequenceReader};
-use crate::structure::{FrameId, Record, Sequence, Storage, TABLES, for_each_table};
+use crate::structure::{
+    CATALOGUE, CatalogueEntry, FrameId, Record, Sequence, Storage, TABLES, for_each_table,
+};
 
 /// Print the rows of a table as JSON lines or CSV.
 ///
@@ -22,9 +24,9 @@ use crate::structure::{FrameId, Record, Sequence, Storage, TABLES, for_each_tabl
   os cat box1 point_measurements --frame 17
   os cat box1 manifest | jq .cameras")]
 pub(super) struct Args {
-    /// Sequence: an MCAP file or a Parquet folder.
+    /// Sequence: an MCAP file or a Parquet folder; for the catalogue, a collection.
     sequence: PathBuf,
-    /// Table name, or `manifest`.
+    /// Table name, or `manifest`; `catalogue` of a collection.
     table: String,
     /// How rows are written.
     #[arg(long, value_enum, default_value_t = Format::Json)]
@@ -46,9 +48,14 @@ enum Format {
 }
 
 pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome> {
-    if args.table != "manifest" && TABLES.iter().all(|table| table.name != args.table) {
+    if !["manifest", CATALOGUE.name].contains(&args.table.as_str())
+        && TABLES.iter().all(|table| table.name != args.table)
+    {
         let names: Vec<&str> = TABLES.iter().map(|table| table.name).collect();
         bail!("there is no table `{}`; expected manifest, {}", args.table, names.join(", "));
+    }
+    if args.table == CATALOGUE.name {
+        return catalogue(args, stdout);
     }
     let reader = format::open(&args.sequence)?;
     if args.table == "manifest" {
@@ -68,14 +75,30 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     Ok(Outcome::Done)
 }
 
+/// The catalogue of a collection, as it stands there.
+fn catalogue(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome> {
+    if args.frame.is_some() {
+        bail!("{} has no column frame_id; leave --frame out", CATALOGUE.name);
+    }
+    print_header::<CatalogueEntry>(args.format, stdout)?;
+    let rows = format::read_catalogue(&args.sequence)?;
+    print_rows(args.format, &rows, &mut args.limit.unwrap_or(usize::MAX), stdout)?;
+    Ok(Outcome::Done)
+}
+
+fn print_header<R: Record>(format: Format, stdout: &mut dyn Write) -> anyhow::Result<()> {
+    if format == Format::Csv {
+        let names: Vec<&str> = R::TABLE.fields.iter().map(|field| field.name).collect();
+        writeln!(stdout, "{}", names.join(","))?;
+    }
+    Ok(())
+}
+
 fn print<R: Record>(args: &Args, reader: &SequenceReader, stdout: &mut dyn Write) -> anyhow::Result<()> {
     if !reader.has::<R>() {
         bail!("{}: has no table {}", args.sequence.display(), R::TABLE.name);
     }
-    if args.format == Format::Csv {
-        let names: Vec<&str> = R::TABLE.fields.iter().map(|field| field.name).collect();
-        writeln!(stdout, "{}", names.join(","))?;
-    }
+    print_header::<R>(args.format, stdout)?;
     let mut left = args.limit.unwrap_or(usize::MAX);
     if let Some(frame) = args.frame {
         let Some(rows) = rows_of_frame::<R>(reader, FrameId(frame))? else {
@@ -103,7 +126,7 @@ fn rows_of_frame<R: Record>(reader: &SequenceReader, frame_id: FrameId) -> anyho
             line_measurements: bundle.line_measurements,
             ..Sequence::default()
         };
-        return Ok(Some(R::rows(&sequence).clone()));
+        return Ok(Some(R::rows(&sequence).to_vec()));
     }
     if reader.frame_list()?.iter().all(|frame| frame.frame_id != frame_id) {
         return Ok(None);

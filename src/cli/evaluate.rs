@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::ValueEnum;
 
-use super::{Outcome, evaluate_files, evaluate_output, evaluate_shown, parsed};
+use super::{Outcome, evaluate_files, evaluate_output, evaluate_shown, inputs, parsed};
 use crate::evaluate::{
     Alignment, AlignmentKind, Delta, EvaluateOptions, Evaluated, Reconstruction, Relation, Step, evaluate,
     summary_table,
@@ -34,7 +34,7 @@ use crate::structure::{FrameId, LineLandmark, MapLine, MapPoint, PointLandmark, 
   os evaluate --files groundtruth.txt estimate.txt -as --save-results estimate.zip")]
 #[expect(clippy::struct_excessive_bools, reason = "each is a switch of its own")]
 pub(super) struct Args {
-    /// Sequences: MCAP files or Parquet folders.
+    /// Sequences: MCAP files, Parquet folders or collections.
     #[arg(required_unless_present = "files")]
     sequences: Vec<PathBuf>,
     /// Compare trajectory files with the first of them: TUM, KITTI or EuRoC, told apart by their content.
@@ -164,8 +164,8 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     args.output.refuse_inputs(&args.sequences)?;
     args.output.refuse_inputs(&args.files)?;
     let compared: Vec<Compared> = if args.files.is_empty() {
-        let sequences = args.sequences.iter();
-        sequences.map(|path| sequence(args, path, &options)).collect::<Result<_, _>>()?
+        let sequences = inputs::sequences(&args.sequences)?;
+        sequences.iter().map(|path| sequence(args, path, &options)).collect::<Result<_, _>>()?
     } else {
         vec![evaluate_files::compare(&args.files, args.stamps()?, &options)?]
     };
@@ -276,8 +276,10 @@ fn sequence(args: &Args, path: &Path, options: &EvaluateOptions) -> anyhow::Resu
 
 /// The name of a file or folder without its ending, which tells apart what was made of one sequence.
 pub(super) fn name_of(path: &Path) -> String {
-    let name = if storage::is_folder(path) { path.file_name() } else { path.file_stem() };
-    name.map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
+    if storage::is_folder(path) {
+        return inputs::called(path).unwrap_or_else(|| path.display().to_string());
+    }
+    path.file_stem().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
 }
 
 /// A result with the names that tell it apart.

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use super::{Outcome, text};
+use super::{Outcome, inputs, text};
 use crate::format::{self, SequenceReader};
 use crate::storage;
 use crate::structure::{Camera, Frame, Manifest, Noise, TrajectoryPose};
@@ -18,7 +18,7 @@ use crate::structure::{Camera, Frame, Manifest, Noise, TrajectoryPose};
   os info out/*
   os info box1 --json | jq .tables")]
 pub(super) struct Args {
-    /// Sequences: MCAP files or Parquet folders.
+    /// Sequences: MCAP files, Parquet folders or collections.
     #[arg(required = true)]
     sequences: Vec<PathBuf>,
     /// Print one JSON object per sequence.
@@ -42,7 +42,7 @@ struct Info<'a> {
 }
 
 pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome> {
-    for (index, path) in args.sequences.iter().enumerate() {
+    for (index, path) in inputs::sequences(&args.sequences)?.iter().enumerate() {
         let reader = format::open(path)?;
         let frames = reader.frame_list()?;
         if args.json {

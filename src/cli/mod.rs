@@ -22,7 +22,9 @@ mod foreign;
 mod graph;
 mod import;
 mod import_trajectory;
+mod index;
 mod info;
+mod inputs;
 mod left_behind;
 mod man;
 mod measure;
@@ -49,8 +51,9 @@ use clap::{CommandFactory, Parser, Subcommand};
 /// Measurements instead of images: tools for Open-Structure sequences.
 ///
 /// A sequence is an MCAP file (NAME.mcap) or a Parquet folder (NAME/ with sequence.json). Every
-/// command reads both; the name of an output decides which is written. Paths may be URLs: s3://,
-/// gs://, http:// and https://.
+/// command reads both; the name of an output decides which is written. A collection is a folder of
+/// Parquet sequences called sequence=NAME; commands that take several sequences take all of its own.
+/// Paths may be URLs: s3://, gs://, http:// and https://.
 #[derive(Parser, Debug)]
 #[command(
     name = "os",
@@ -69,6 +72,7 @@ enum Command {
     Validate(validate::Args),
     Explain(explain::Args),
     Info(info::Args),
+    Index(index::Args),
     Cat(cat::Args),
     Copy(copy::Args),
     Simulate(simulate::Args),
@@ -116,6 +120,7 @@ pub fn main() -> ExitCode {
         Command::Validate(args) => validate::run(args, &mut stdout),
         Command::Explain(args) => explain::run(args, &mut stdout),
         Command::Info(args) => info::run(args, &mut stdout),
+        Command::Index(args) => index::run(args, &mut stdout),
         Command::Cat(args) => cat::run(args, &mut stdout),
         Command::Copy(args) => copy::run(args, &mut stdout),
         Command::Simulate(args) => simulate::run(args, &mut stdout),

@@ -12,7 +12,7 @@ use super::plot_options::{
     AlignName, Figure, FigureFile, FileFormat, FrameIds, Over, ThemeName, View, dots_per_inch, figure_file,
     font_pt, frame_ids, millimetres, width_mm,
 };
-use super::{Outcome, evaluate_output, parsed, plot_compared, plot_figures, program, text};
+use super::{Outcome, evaluate_output, inputs, parsed, plot_compared, plot_figures, program, text};
 use crate::format::Partial;
 use crate::plot::ViewFrom;
 use crate::plot::paper::{Look, PaperFigure};
@@ -142,6 +142,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     let (figure, inputs) = args.figure();
     let FigureFile { path: output, format } = &args.output;
     evaluate_output::refuse_input(output, inputs)?;
+    let inputs = &inputs::sequences(inputs)?;
     // Reserved before the work begins.
     let partial = Partial::file(output, args.force)?;
     let wanted = Wanted {

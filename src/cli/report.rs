@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 
 use super::progress::Stages;
-use super::{Outcome, evaluate_output, plot, text};
+use super::{Outcome, evaluate_output, inputs, plot, text};
 use crate::format::Partial;
 use crate::report::{Report, ReportOptions};
 use crate::storage;
@@ -50,7 +50,8 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         let unit = if stage == "validating" { "rows" } else { "frames" };
         stages.update_in(stage, unit, done, total);
     };
-    let inputs: Vec<&Path> = args.inputs.iter().map(PathBuf::as_path).collect();
+    let inputs = inputs::sequences(&args.inputs)?;
+    let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
     let report = Report::of(&inputs, &ReportOptions { edges: Some(&plot::edges), progress: Some(&update) })?;
     drop(stages);
     fs::write(partial.path(), report.html()?).with_context(|| output.display().to_string())?;

@@ -8,7 +8,7 @@ use super::{Outcome, text};
 use crate::datasets;
 use crate::format;
 use crate::simulate::Recipe;
-use crate::structure::{TABLES, table_info};
+use crate::structure::{CATALOGUE, TABLES, any_table_info};
 use crate::validate;
 
 /// Print a schema of the format: JSON Schema, or the columns of a table.
@@ -30,7 +30,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         let mut table = text::table(["NAME", "ONE ROW IS"], &[]);
         table.add_row(["manifest", "What is said about the sequence as a whole."]);
         table.add_row(["table_summaries", "Row count and digest of one table."]);
-        for info in TABLES {
+        for info in TABLES.iter().copied().chain([CATALOGUE]) {
             let description = info.description();
             let sentence = description.split_inclusive(". ").next().unwrap_or_default().trim();
             table.add_row([info.name, sentence]);
@@ -43,7 +43,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     };
     if args.columns {
         let info =
-            table_info(name).with_context(|| format!("there is no table `{name}`; try `os schema`"))?;
+            any_table_info(name).with_context(|| format!("there is no table `{name}`; try `os schema`"))?;
         let mut table = text::table(["NAME", "TYPE", "UNIT", "SPACE", "MEANING"], &[]);
         for field in info.fields {
             let kind = format!("{}{}", field.kind.name(), if field.nullable { "?" } else { "" });

@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::chart::chart;
 use super::progress::Progress;
-use super::{Outcome, text};
+use super::{Outcome, inputs, text};
 use crate::format;
 use crate::statistics::{
     Analysed, Analysis, Counted, Difference, Distribution, FeatureStatistics, SequenceStatistics,
@@ -31,7 +31,7 @@ use crate::structure::{
   os stats box1 --frames --csv > frames.csv")]
 #[expect(clippy::struct_excessive_bools, reason = "each is a switch of its own")]
 pub(super) struct Args {
-    /// Sequences: MCAP files or Parquet folders.
+    /// Sequences: MCAP files, Parquet folders or collections.
     #[arg(required_unless_present = "schema")]
     sequences: Vec<PathBuf>,
     /// Print one JSON object per sequence.
@@ -65,7 +65,8 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         return Ok(Outcome::Done);
     }
     let mut all = Vec::new();
-    for (index, path) in args.sequences.iter().enumerate() {
+    let sequences = inputs::sequences(&args.sequences)?;
+    for (index, path) in sequences.iter().enumerate() {
         let analysed = analyse(path)?;
         if args.json {
             let frames = args.frames.then_some(analysed.frames.as_slice());
@@ -76,7 +77,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
             frames_csv(&analysed, index == 0, stdout)?;
         } else if args.frames {
             frames_table(&analysed, stdout)?;
-        } else if args.sequences.len() == 1 && !args.csv {
+        } else if sequences.len() == 1 && !args.csv {
             one(&analysed, stdout)?;
         } else {
             // Only what is compared is kept.
@@ -231,7 +232,7 @@ fn rows(found: &SequenceStatistics) -> Vec<(String, &'static str, f64, Option<Di
 
 /// The name of a sequence's file or folder, which tells apart what was made of one sequence.
 fn file_name(path: &Path) -> String {
-    path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
+    inputs::called(path).unwrap_or_else(|| path.display().to_string())
 }
 
 fn comparison(all: &[(String, SequenceStatistics)], out: &mut dyn Write) -> anyhow::Result<()> {

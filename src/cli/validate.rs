@@ -7,6 +7,7 @@ use clap::ValueEnum;
 
 use super::progress::Progress;
 use super::{Outcome, text};
+use crate::format::Collection;
 use crate::validate::{Finding, Options, Report, Severity, validate};
 
 /// Check sequences against the specification.
@@ -18,11 +19,12 @@ use crate::validate::{Finding, Options, Report, Severity, validate};
 #[command(after_help = "Examples:
   os validate box1.mcap
   os validate out/* --deny warnings
+  os validate all                        a collection: its catalogue, then each sequence
   os validate box1 --json | jq '.findings[].rule'
 
 Exit codes: 0 conformant, 1 a path cannot be read, 2 misused, 3 errors found (or warnings, if denied).")]
 pub(super) struct Args {
-    /// Sequences: MCAP files or Parquet folders.
+    /// Sequences: MCAP files or Parquet folders; collections: their catalogue and each of their sequences.
     #[arg(required = true)]
     sequences: Vec<PathBuf>,
     /// Print one JSON report a line; its schema is `os schema validation_report`.
@@ -49,7 +51,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     let denied = if args.deny.is_some() { Severity::Warning } else { Severity::Error };
     let mut outcome = Outcome::Done;
     let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
-    for path in &args.sequences {
+    for path in &expanded(&args.sequences)? {
         let progress = Progress::new(path.display().to_string(), "rows");
         let update = |done, total| progress.update(done, total);
         let options = Options { listed: args.max_findings, progress: Some(&update), ..Options::default() };
@@ -67,6 +69,19 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         stdout.flush()?;
     }
     Ok(outcome)
+}
+
+/// Each path, and after a collection its sequences.
+fn expanded(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
+    let mut all = Vec::new();
+    for path in paths {
+        all.push(path.clone());
+        // A path that cannot be looked into is told of when its turn comes.
+        if let Ok(Some(collection)) = Collection::at(path) {
+            all.extend(collection.members.into_iter().map(|member| member.path));
+        }
+    }
+    Ok(all)
 }
 
 fn print(report: &Report, colour: bool, out: &mut dyn Write) -> anyhow::Result<()> {

@@ -11,7 +11,7 @@ use arrow::datatypes::{DataType, Field as ArrowField, Float64Type, Int64Type, Sc
 
 use super::Error;
 use super::arrow_schema::data_type;
-use crate::structure::{Bitmap, ColumnSink, ColumnSource, Field, Lists, Nullable, Record};
+use crate::structure::{Bitmap, ColumnSink, ColumnSource, Field, Lists, Nullable, Record, TextLists};
 
 /// One record batch of some rows.
 ///
@@ -110,6 +110,9 @@ impl ColumnSink for Columns {
     fn utf8<'v>(&mut self, values: impl ExactSizeIterator<Item = &'v str>) {
         self.columns.push(Arc::new(StringArray::from_iter_values(values)));
     }
+    fn optional_utf8<'v>(&mut self, values: impl ExactSizeIterator<Item = Option<&'v str>>) {
+        self.columns.push(Arc::new(values.collect::<StringArray>()));
+    }
     fn optional_binary<'v>(&mut self, values: impl ExactSizeIterator<Item = Option<&'v [u8]>>) {
         self.columns.push(Arc::new(values.collect::<BinaryArray>()));
     }
@@ -120,6 +123,14 @@ impl ColumnSink for Columns {
             offsets.push(end(&values));
         }
         self.list(offsets, Arc::new(Int64Array::from(values)), None);
+    }
+    fn utf8_list<'v>(&mut self, lists: impl ExactSizeIterator<Item = &'v [String]>) {
+        let (mut offsets, mut values) = (vec![0], Vec::new());
+        for list in lists {
+            values.extend(list.iter().map(String::as_str));
+            offsets.push(end(&values));
+        }
+        self.list(offsets, Arc::new(StringArray::from(values)), None);
     }
     fn float64_list<'v>(&mut self, lists: impl ExactSizeIterator<Item = &'v [f64]>) {
         let (mut offsets, mut values) = (vec![0], Vec::new());
@@ -172,6 +183,12 @@ impl Batch {
         field: usize,
         values: impl Fn(&'a ListArray) -> &'a [T],
     ) -> Result<Lists<'a, T>, Error> {
+        let list = self.list(field)?;
+        Ok(Lists { offsets: list.offsets(), values: values(list), validity: validity(list) })
+    }
+
+    /// A list in which no element is null.
+    fn list(&self, field: usize) -> Result<&ListArray, Error> {
         let list = self.columns[field].as_list::<i32>();
         if let Some(nulls) = list.values().nulls().filter(|nulls| nulls.null_count() > 0) {
             let element = (0..nulls.len()).find(|row| nulls.is_null(*row)).unwrap_or(0);
@@ -179,7 +196,7 @@ impl Batch {
                 list.offsets().partition_point(|offset| usize::try_from(*offset).unwrap_or(0) <= element);
             return Err(self.null(field, row.saturating_sub(1)));
         }
-        Ok(Lists { offsets: list.offsets(), values: values(list), validity: validity(list) })
+        Ok(list)
     }
 }
 
@@ -215,6 +232,10 @@ impl ColumnSource for Batch {
         let array = self.whole(field)?.as_string::<i32>();
         Ok(Lists { offsets: array.offsets(), values: array.value_data(), validity: None })
     }
+    fn optional_utf8(&self, field: usize) -> Result<Lists<'_, u8>, Error> {
+        let array = self.columns[field].as_string::<i32>();
+        Ok(Lists { offsets: array.offsets(), values: array.value_data(), validity: validity(array) })
+    }
     fn optional_binary(&self, field: usize) -> Result<Lists<'_, u8>, Error> {
         let array = self.columns[field].as_binary::<i32>();
         Ok(Lists { offsets: array.offsets(), values: array.value_data(), validity: validity(array) })
@@ -222,6 +243,13 @@ impl ColumnSource for Batch {
     fn int64_list(&self, field: usize) -> Result<Lists<'_, i64>, Error> {
         self.whole(field)?;
         self.list_of(field, |list| list.values().as_primitive::<Int64Type>().values())
+    }
+    fn utf8_list(&self, field: usize) -> Result<TextLists<'_>, Error> {
+        self.whole(field)?;
+        let list = self.list(field)?;
+        let texts = list.values().as_string::<i32>();
+        let texts = Lists { offsets: texts.offsets(), values: texts.value_data(), validity: None };
+        Ok(TextLists { offsets: list.offsets(), texts })
     }
     fn float64_list(&self, field: usize) -> Result<Lists<'_, f64>, Error> {
         self.whole(field)?;

@@ -25,6 +25,7 @@ pub(super) fn data_type(kind: ColumnType) -> DataType {
         ColumnType::Binary => DataType::Binary,
         ColumnType::Int64List => list(DataType::Int64),
         ColumnType::Float64List => list(DataType::Float64),
+        ColumnType::Utf8List => list(DataType::Utf8),
     }
 }
 

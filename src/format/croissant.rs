@@ -87,7 +87,7 @@ fn record_set(table: &TableInfo) -> Value {
                 "dataType": data_type(field.kind),
                 "source": { "fileObject": { "@id": file }, "extract": { "column": field.name } },
             });
-            if matches!(field.kind, ColumnType::Int64List | ColumnType::Float64List) {
+            if matches!(field.kind, ColumnType::Int64List | ColumnType::Float64List | ColumnType::Utf8List) {
                 value["isArray"] = Value::from(true);
                 value["arrayShape"] = Value::from("-1");
             }
@@ -111,7 +111,7 @@ fn data_type(kind: ColumnType) -> &'static str {
         ColumnType::Int64 | ColumnType::Int64List => "sc:Integer",
         ColumnType::Float64 | ColumnType::Float64List => "sc:Float",
         ColumnType::Boolean => "sc:Boolean",
-        ColumnType::Utf8 | ColumnType::Binary => "sc:Text",
+        ColumnType::Utf8 | ColumnType::Binary | ColumnType::Utf8List => "sc:Text",
     }
 }
 

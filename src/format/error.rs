@@ -156,6 +156,26 @@ pub enum Error {
         /// What was called too early, too late or not at all.
         detail: &'static str,
     },
+    /// A sequence of a collection lies in a folder of another name.
+    #[error("{}: holds the sequence `{name}`; expected a folder called {expected}", path.display())]
+    Misnamed {
+        /// The folder.
+        path: PathBuf,
+        /// Name that the manifest says.
+        name: String,
+        /// What the folder of that name is called.
+        expected: String,
+    },
+    /// A sequence lies in a collection under a name that makes it no part of it.
+    #[error("{}: a sequence that is no part of the collection; expected {} ({remedy})", path.display(), expected.display())]
+    OutsideCollection {
+        /// The sequence.
+        path: PathBuf,
+        /// Where the collection would have it.
+        expected: PathBuf,
+        /// What brings it there.
+        remedy: String,
+    },
     /// A third-party decoder failed in a way that its authors did not foresee.
     #[error("{}: the {container} decoder gave up: {detail}", path.display())]
     Decoder {

@@ -9,8 +9,8 @@ use serde_json::Value;
 use super::member_names::{Members, member_names};
 use crate::structure::registry::SPEC_VERSION;
 use crate::structure::{
-    Camera, Clock, Conventions, Distortion, Exclusion, Generator, Manifest, Noise, Recovery, Source,
-    SourceFile, TableSummary, for_each_table,
+    Camera, CatalogueEntry, Clock, Conventions, Distortion, Exclusion, Generator, Manifest, Noise, Recovery,
+    Source, SourceFile, TableSummary, for_each_table,
 };
 
 /// Where the schemas of this specification version are named.
@@ -130,12 +130,13 @@ fn without_null(schema: &mut Schema) {
 
 macro_rules! by_name {
     ($($name:ident: $row:ident,)+) => {
-        /// The JSON Schema of `manifest`, `table_summaries` or a table's rows, as it stands in `spec/schemas`.
+        /// The JSON Schema of `manifest`, `table_summaries` or the rows of a table, be it of sequences or of collections, as it stands in `spec/schemas`.
         #[must_use]
         pub fn json_schema(name: &str) -> Option<String> {
             match name {
                 "manifest" => Some(schema_text::<Manifest>(name)),
                 "table_summaries" => Some(schema_text::<TableSummary>(name)),
+                "catalogue" => Some(schema_text::<CatalogueEntry>(name)),
                 $(stringify!($name) => Some(schema_text::<crate::structure::$row>(name)),)+
                 _ => None,
             }

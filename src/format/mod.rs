@@ -12,6 +12,7 @@ mod arrow_batch;
 mod arrow_message;
 mod arrow_schema;
 mod batches;
+mod collection;
 mod copy;
 mod counted_file;
 mod croissant;
@@ -40,6 +41,10 @@ mod writer;
 
 pub use arrow_schema::arrow_schema;
 pub use batches::Batches;
+pub(crate) use collection::StoredCatalogue;
+pub use collection::{
+    Collection, Member, catalogue_entry, folder_name, read_catalogue, sequence_name, write_catalogue,
+};
 pub use copy::copy;
 pub use encoding::Encoding;
 pub use error::Error;

@@ -21,3 +21,5 @@ pub(super) const FOXGLOVE_PREFIX: &str = "/foxglove/";
 pub(super) const MANIFEST_FILE: &str = "sequence.json";
 /// Croissant description of a Parquet folder.
 pub(super) const CROISSANT_FILE: &str = "croissant.json";
+/// Catalogue of a collection.
+pub(super) const CATALOGUE_FILE: &str = "catalogue.parquet";

@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use super::batches::{BatchSource, Batches};
+use super::collection::Collection;
 use super::encoding::Encoding;
 use super::frames::{Cursors, FrameSource, Frames, frame_topics, take_into};
 use super::mcap_reader::McapReader;
@@ -430,10 +431,11 @@ fn read_manifest(path: &Path) -> Result<Vec<u8>, Error> {
             });
         }
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-            return Err(Error::NotASequence {
-                path: path.to_owned(),
-                found: format!("a folder without {}", names::MANIFEST_FILE),
-            });
+            let found = match Collection::at(path) {
+                Ok(Some(_)) => "a collection of sequences".to_owned(),
+                _ => format!("a folder without {}", names::MANIFEST_FILE),
+            };
+            return Err(Error::NotASequence { path: path.to_owned(), found });
         }
         Err(error) => return Err(Error::io(&manifest_path)(error)),
     };

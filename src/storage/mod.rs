@@ -136,6 +136,12 @@ pub fn is_folder(path: &Path) -> bool {
     matches!(find(path), Ok(Found::Folder))
 }
 
+/// Whether what stands in a folder can be listed there; over HTTP it cannot.
+#[must_use]
+pub fn lists(path: &Path) -> bool {
+    !matches!(scheme(path), Some(("http" | "https", _)))
+}
+
 /// What stands in a folder, by name.
 ///
 /// * `known` — names that may be there, for HTTP, which lists nothing: they are asked for one by one.

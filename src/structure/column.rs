@@ -70,6 +70,28 @@ impl<'a, T> Lists<'a, T> {
     }
 }
 
+/// A column of lists of text.
+#[derive(Clone, Copy, Debug)]
+pub struct TextLists<'a> {
+    /// Row `i` has the texts from `offsets[i]` up to `offsets[i + 1]`.
+    pub offsets: &'a [i32],
+    /// Texts of all rows, one after the other; the bytes are valid UTF-8.
+    pub texts: Lists<'a, u8>,
+}
+
+impl TextLists<'_> {
+    /// The texts of a row.
+    #[must_use]
+    pub fn get(&self, row: usize) -> Vec<String> {
+        let bound = |index: usize| usize::try_from(self.offsets[index]).unwrap_or(0);
+        (bound(row)..bound(row + 1)).map(|text| text_of(self.texts.get(text))).collect()
+    }
+}
+
+fn text_of(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
 /// Takes the columns of a run of rows, in the order of the record's fields.
 pub trait ColumnSink {
     /// A column of integers.
@@ -84,10 +106,14 @@ pub trait ColumnSink {
     fn boolean(&mut self, values: impl ExactSizeIterator<Item = bool>);
     /// A column of text.
     fn utf8<'v>(&mut self, values: impl ExactSizeIterator<Item = &'v str>);
+    /// A column of text, some absent.
+    fn optional_utf8<'v>(&mut self, values: impl ExactSizeIterator<Item = Option<&'v str>>);
     /// A column of bytes, some absent.
     fn optional_binary<'v>(&mut self, values: impl ExactSizeIterator<Item = Option<&'v [u8]>>);
     /// A column of lists of integers.
     fn int64_list<I: Iterator<Item = i64>>(&mut self, values: impl ExactSizeIterator<Item = I>);
+    /// A column of lists of text.
+    fn utf8_list<'v>(&mut self, values: impl ExactSizeIterator<Item = &'v [String]>);
     /// A column of lists of floats.
     fn float64_list<'v>(&mut self, values: impl ExactSizeIterator<Item = &'v [f64]>);
     /// A column of lists of floats, some absent.
@@ -116,10 +142,14 @@ pub trait ColumnSource {
     fn boolean(&self, field: usize) -> Result<Bitmap<'_>, Self::Error>;
     /// A column of text; the bytes are valid UTF-8.
     fn utf8(&self, field: usize) -> Result<Lists<'_, u8>, Self::Error>;
+    /// A column of text, some absent; the bytes are valid UTF-8.
+    fn optional_utf8(&self, field: usize) -> Result<Lists<'_, u8>, Self::Error>;
     /// A column of bytes, some absent.
     fn optional_binary(&self, field: usize) -> Result<Lists<'_, u8>, Self::Error>;
     /// A column of lists of integers.
     fn int64_list(&self, field: usize) -> Result<Lists<'_, i64>, Self::Error>;
+    /// A column of lists of text.
+    fn utf8_list(&self, field: usize) -> Result<TextLists<'_>, Self::Error>;
     /// A column of lists of floats, none absent.
     fn float64_list(&self, field: usize) -> Result<Lists<'_, f64>, Self::Error>;
     /// A column of lists of floats, some absent.
@@ -250,11 +280,56 @@ impl ColumnValue for String {
         source.utf8(field)
     }
     fn get(view: Self::View<'_>, row: usize) -> Self {
-        Self::from_utf8_lossy(view.get(row)).into_owned()
+        text_of(view.get(row))
     }
     fn digest(&self, bytes: &mut Vec<u8>) {
         digest_length(self.len(), bytes);
         bytes.extend_from_slice(self.as_bytes());
+    }
+}
+
+impl ColumnValue for Option<String> {
+    const TYPE: ColumnType = ColumnType::Utf8;
+    const NULLABLE: bool = true;
+    type View<'a> = Lists<'a, u8>;
+
+    fn put<'v, S: ColumnSink>(sink: &mut S, values: impl ExactSizeIterator<Item = &'v Self>) {
+        sink.optional_utf8(values.map(Option::as_deref));
+    }
+    fn view<S: ColumnSource>(source: &S, field: usize) -> Result<Self::View<'_>, S::Error> {
+        source.optional_utf8(field)
+    }
+    fn get(view: Self::View<'_>, row: usize) -> Self {
+        view.is_present(row).then(|| text_of(view.get(row)))
+    }
+    fn digest(&self, bytes: &mut Vec<u8>) {
+        bytes.push(u8::from(self.is_some()));
+        if let Some(text) = self {
+            text.digest(bytes);
+        }
+    }
+    fn is_absent(&self) -> bool {
+        self.is_none()
+    }
+}
+
+impl ColumnValue for Vec<String> {
+    const TYPE: ColumnType = ColumnType::Utf8List;
+    const NULLABLE: bool = false;
+    type View<'a> = TextLists<'a>;
+
+    fn put<'v, S: ColumnSink>(sink: &mut S, values: impl ExactSizeIterator<Item = &'v Self>) {
+        sink.utf8_list(values.map(Vec::as_slice));
+    }
+    fn view<S: ColumnSource>(source: &S, field: usize) -> Result<Self::View<'_>, S::Error> {
+        source.utf8_list(field)
+    }
+    fn get(view: Self::View<'_>, row: usize) -> Self {
+        view.get(row)
+    }
+    fn digest(&self, bytes: &mut Vec<u8>) {
+        digest_length(self.len(), bytes);
+        self.iter().for_each(|text| text.digest(bytes));
     }
 }
 

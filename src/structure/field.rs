@@ -17,6 +17,8 @@ pub enum ColumnType {
     Int64List,
     /// List of IEEE 754 binary64, never null inside.
     Float64List,
+    /// List of UTF-8 text, never null inside.
+    Utf8List,
 }
 
 impl ColumnType {
@@ -31,6 +33,7 @@ impl ColumnType {
             Self::Binary => "binary",
             Self::Int64List => "list<int64>",
             Self::Float64List => "list<float64>",
+            Self::Utf8List => "list<utf8>",
         }
     }
 }

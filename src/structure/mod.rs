@@ -4,6 +4,7 @@
 //! specification; [`Record`] and [`Field`] carry that description.
 
 mod camera;
+mod catalogue;
 mod cells;
 mod column;
 mod correspondence;
@@ -40,8 +41,9 @@ mod trajectory;
 mod trajectory_file;
 
 pub use camera::{Camera, Distortion};
+pub use catalogue::CatalogueEntry;
 pub use cells::ImageCells;
-pub use column::{Bitmap, ColumnSink, ColumnSource, ColumnValue, Lists, Nullable};
+pub use column::{Bitmap, ColumnSink, ColumnSource, ColumnValue, Lists, Nullable, TextLists};
 pub use correspondence::{
     LineCorrespondence, PointCorrespondence, line_correspondences, point_correspondences,
 };
@@ -71,7 +73,7 @@ pub use sequence::{FrameBundle, Sequence};
 pub use statistics::{CELL_SIZE_PX, FrameCounter, frame_statistics};
 pub(crate) use statistics::{angle, median, ray, shared};
 pub use structural_group::StructuralGroup;
-pub use table::{TABLES, table_info};
+pub use table::{CATALOGUE, TABLES, any_table_info, table_info};
 pub(crate) use table::{for_each_frame_table, for_each_table};
 pub use tracking::TrackedFrame;
 pub use trajectory::TrajectoryPose;

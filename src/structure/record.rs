@@ -9,7 +9,7 @@ use super::column::{ColumnSink, ColumnSource, ColumnValue};
 use super::field::TableInfo;
 use super::sequence::Sequence;
 
-/// A row of one table of the format.
+/// A row of one table of the format: of a sequence, or of a collection of them.
 ///
 /// Implemented by the macro `record!` alone.
 pub trait Record:
@@ -39,11 +39,11 @@ pub trait Record:
     /// The frame of a row of a per-frame table.
     fn frame(&self) -> Option<super::FrameId>;
 
-    /// The rows of this table in a sequence.
-    fn rows(sequence: &Sequence) -> &Vec<Self>;
-
-    /// The rows of this table in a sequence, to be changed.
-    fn rows_mut(sequence: &mut Sequence) -> &mut Vec<Self>;
+    /// The rows of this table in a sequence; none where it is not a table of sequences.
+    fn rows(sequence: &Sequence) -> &[Self] {
+        let _ = sequence;
+        &[]
+    }
 }
 
 /// Whether a value is left out of a JSON row.
@@ -78,11 +78,11 @@ pub(crate) fn digest<T: ColumnValue>(value: &T, name: &str, added: &[&str], byte
 /// Defines a row struct together with its [`TableInfo`] and its [`Record`] implementation.
 ///
 /// `[unit, space]` stands before each column, `[unit, space, since]` before one that a minor version added; `frame:` names the column that says the frame of a
-/// per-frame row.
+/// per-frame row; `of: collection` says that the table belongs to a collection, not to a sequence.
 macro_rules! record {
     (
         $(#[doc = $doc:literal])*
-        pub struct $name:ident in $table:ident ($storage:ident, $need:ident, key: [$($key:ident),+] $(, frame: $frame:ident)?) {
+        pub struct $name:ident in $table:ident ($storage:ident, $need:ident, key: [$($key:ident),+] $(, frame: $frame:ident)? $(, of: $owner:ident)?) {
             $(
                 $(#[doc = $field_doc:literal])*
                 [$unit:literal, $space:literal $(, $since:literal)?]
@@ -160,17 +160,22 @@ macro_rules! record {
                 frame
             }
 
-            fn rows(sequence: &crate::structure::Sequence) -> &Vec<Self> {
-                &sequence.$table
-            }
-
-            fn rows_mut(sequence: &mut crate::structure::Sequence) -> &mut Vec<Self> {
-                &mut sequence.$table
-            }
+            crate::structure::record::rows_of!($table $($owner)?);
         }
     };
 }
 pub(crate) use record;
+
+/// Where the rows of a table are in a sequence, if it is a table of sequences.
+macro_rules! rows_of {
+    ($table:ident) => {
+        fn rows(sequence: &crate::structure::Sequence) -> &[Self] {
+            &sequence.$table
+        }
+    };
+    ($table:ident collection) => {};
+}
+pub(crate) use rows_of;
 
 /// A key column's value as it is written in messages.
 pub(crate) trait KeyPart {

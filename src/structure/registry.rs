@@ -1,7 +1,7 @@
 //! Well-known values: the registry of the specification in code.
 
 /// Version of the specification that this crate writes.
-pub const SPEC_VERSION: &str = "1.3.0";
+pub const SPEC_VERSION: &str = "1.4.0";
 
 /// Camera model: perspective projection without distortion.
 pub const PINHOLE: &str = "pinhole";

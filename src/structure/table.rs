@@ -53,8 +53,17 @@ macro_rules! list {
 }
 for_each_table!(list);
 
-/// The table of a name.
+/// The table of a collection of sequences; it is not a table of any of them.
+pub const CATALOGUE: &TableInfo = <super::CatalogueEntry as Record>::TABLE;
+
+/// The table of sequences of a name.
 #[must_use]
 pub fn table_info(name: &str) -> Option<&'static TableInfo> {
     TABLES.iter().copied().find(|table| table.name == name)
+}
+
+/// The table of a name, be it of sequences or of collections.
+#[must_use]
+pub fn any_table_info(name: &str) -> Option<&'static TableInfo> {
+    table_info(name).or_else(|| Some(CATALOGUE).filter(|table| table.name == name))
 }

@@ -15,6 +15,7 @@
 //! Every table is read once, whatever its length, and memory is bounded by frames and landmarks. What
 //! cannot be decoded is a finding, and the rest is checked all the same.
 
+mod collection;
 mod container;
 mod correspondences;
 mod depth_noise;
@@ -88,7 +89,7 @@ pub enum Error {
     },
 }
 
-/// Validates a sequence in a file or folder, however broken.
+/// Validates a sequence in a file or folder, however broken; of a collection its catalogue, not the sequences themselves.
 ///
 /// The report is the same for any number of threads.
 ///

@@ -12,7 +12,7 @@ use super::rules::{Severity, rules_for};
 /// Version of the report's own schema.
 pub const REPORT_VERSION: &str = "1.0.0";
 
-/// The result of validating one sequence.
+/// The result of validating one sequence, or the catalogue of a collection.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Report {
     /// Version of the schema of this report, as `major.minor.patch`.
@@ -22,7 +22,7 @@ pub struct Report {
     /// What was validated; absent for a sequence in memory.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub path: Option<String>,
-    /// `MCAP file` or `Parquet folder`; absent where neither could be told.
+    /// `MCAP file`, `Parquet folder` or `collection`; absent where none could be told.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub encoding: Option<&'static str>,
     /// Version of the specification that the sequence declares.

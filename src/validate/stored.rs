@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+use super::collection::collection;
 use super::finding::{Detail, Findings};
 use super::manifest::{Known, manifest, manifest_value};
 use super::report::{Report, Subject};
@@ -11,7 +12,7 @@ use super::run::{Tables, run};
 use super::source::Source;
 use super::tables::{Progress, Shared, damaged};
 use super::{Error, Options, container};
-use crate::format::{self, Encoding, McapSurvey, SequenceReader, survey_file};
+use crate::format::{self, Collection, Encoding, McapSurvey, SequenceReader, StoredTable, survey_file};
 use crate::storage::{self, Found};
 use crate::structure::registry::SPEC_VERSION;
 use crate::structure::{Sequence, Storage, TABLES, TableInfo, TableSummary, for_each_table};
@@ -24,6 +25,11 @@ pub(crate) fn validate(path: &Path, options: &Options<'_>) -> Result<Report, Err
         .file_name()
         .is_some_and(|name| name == "sequence.json")
         .then(|| path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new(".")));
+    match Collection::at(path) {
+        Ok(Some(found)) => return Ok(collection(&found, options)),
+        Err(format::Error::Io { cause, .. }) => return Err(io(cause)),
+        _ => {}
+    }
     let mut findings = Findings::new(options.listed);
     let mut subject = Subject { path: Some(path.display().to_string()), ..Subject::default() };
     let target = folder.unwrap_or(path);
@@ -206,28 +212,33 @@ fn finish(subject: Subject, tables: Tables, mut findings: Findings) -> Report {
 fn columns(reader: &SequenceReader, findings: &mut Findings) -> BTreeSet<&'static str> {
     let mut skipped = BTreeSet::new();
     for stored in reader.tables() {
-        let table = stored.table.name;
-        for column in &stored.unknown_columns {
-            findings.add(RuleId::UnknownContent, Some(table), || {
-                Detail::new(format!("columns of version {SPEC_VERSION}"), "another one")
-                    .id(format!("column {column}"))
-            });
-        }
-        for column in &stored.missing_columns {
-            findings.add(RuleId::ColumnsPresent, Some(table), || {
-                Detail::new(format!("a column {column}"), "none; the rows are not checked").id(column)
-            });
-        }
-        for (column, found, expected) in &stored.mistyped_columns {
-            findings.add(RuleId::ColumnsTyped, Some(table), || {
-                Detail::new(*expected, format!("{found}; the rows are not checked")).id(column)
-            });
-        }
-        if !(stored.missing_columns.is_empty() && stored.mistyped_columns.is_empty()) {
-            skipped.insert(table);
+        if !columns_fit(&stored, findings) {
+            skipped.insert(stored.table.name);
         }
     }
     skipped
+}
+
+/// Checks the columns of a table; gives whether its rows can be decoded.
+pub(crate) fn columns_fit(stored: &StoredTable, findings: &mut Findings) -> bool {
+    let table = stored.table.name;
+    for column in &stored.unknown_columns {
+        findings.add(RuleId::UnknownContent, Some(table), || {
+            Detail::new(format!("columns of version {SPEC_VERSION}"), "another one")
+                .id(format!("column {column}"))
+        });
+    }
+    for column in &stored.missing_columns {
+        findings.add(RuleId::ColumnsPresent, Some(table), || {
+            Detail::new(format!("a column {column}"), "none; the rows are not checked").id(column)
+        });
+    }
+    for (column, found, expected) in &stored.mistyped_columns {
+        findings.add(RuleId::ColumnsTyped, Some(table), || {
+            Detail::new(*expected, format!("{found}; the rows are not checked")).id(column)
+        });
+    }
+    stored.missing_columns.is_empty() && stored.mistyped_columns.is_empty()
 }
 
 /// Tables with columns that this version does not know.

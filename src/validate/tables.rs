@@ -163,7 +163,12 @@ pub(crate) fn damaged(error: &Error, table: &'static str, findings: &mut Finding
 }
 
 /// Checks the order of a run of rows; gives whether it holds.
-fn order<R: Record>(before: Option<&R>, rows: &[R], first_row: u64, findings: &mut Findings) -> bool {
+pub(crate) fn order<R: Record>(
+    before: Option<&R>,
+    rows: &[R],
+    first_row: u64,
+    findings: &mut Findings,
+) -> bool {
     let table = Some(R::TABLE.name);
     let mut ordered = true;
     let mut before = before;
@@ -221,7 +226,8 @@ fn is_id(field: &Field) -> bool {
     field.name.ends_with("_id") || field.name.ends_with("_ids") || field.name == "rows"
 }
 
-fn scan<R: Record>(rows: &[R], first_row: u64, findings: &mut Findings) {
+/// Looks at every number of some rows.
+pub(crate) fn scan<R: Record>(rows: &[R], first_row: u64, findings: &mut Findings) {
     let mut scanner = Scanner { table: R::TABLE.name, fields: R::TABLE.fields, next: 0, first_row, findings };
     R::put(rows, &mut scanner);
 }
@@ -284,11 +290,17 @@ impl ColumnSink for Scanner<'_> {
     fn utf8<'v>(&mut self, _: impl ExactSizeIterator<Item = &'v str>) {
         self.field();
     }
+    fn optional_utf8<'v>(&mut self, _: impl ExactSizeIterator<Item = Option<&'v str>>) {
+        self.field();
+    }
     fn optional_binary<'v>(&mut self, _: impl ExactSizeIterator<Item = Option<&'v [u8]>>) {
         self.field();
     }
     fn int64_list<I: Iterator<Item = i64>>(&mut self, values: impl ExactSizeIterator<Item = I>) {
         self.integers((0..).zip(values).flat_map(|(row, list)| list.map(move |value| (row, value))));
+    }
+    fn utf8_list<'v>(&mut self, _: impl ExactSizeIterator<Item = &'v [String]>) {
+        self.field();
     }
     fn float64_list<'v>(&mut self, values: impl ExactSizeIterator<Item = &'v [f64]>) {
         self.floats((0..).zip(values).flat_map(|(row, list)| list.iter().map(move |value| (row, *value))));

@@ -8,7 +8,8 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use open_structure::format::{self, Error};
-use open_structure::structure::MapPoint;
+use open_structure::structure::{CatalogueEntry, MapPoint};
+use open_structure::validate::{Options, validate};
 use sample::{Parts, folder_parts, mcap_bytes};
 
 /// No file here is larger than 100 kB, so this much memory is never honestly needed.
@@ -272,6 +273,45 @@ fn a_parquet_dictionary_bomb_stays_within_bounds() {
     let error = reader.table::<MapPoint>().expect_err("so much is refused");
     assert!(matches!(error, Error::TooLarge { .. }), "{error}");
     Tally::default().tell("dictionary bomb");
+}
+
+/// The catalogue of a collection is read, and held against what is there, whatever it says.
+#[test]
+fn bits_and_numbers_of_a_catalogue_change() {
+    let folder = tempfile::tempdir().unwrap();
+    let rows: Vec<CatalogueEntry> = (0..40)
+        .map(|number| CatalogueEntry {
+            sequence: format!("sequence {number:02}"),
+            licence: (number % 3 == 0).then(|| "CC0-1.0".to_owned()),
+            path_length: Some(f64::from(number) / 3.0),
+            tables: vec!["frames".to_owned(); number as usize % 5],
+            ..CatalogueEntry::default()
+        })
+        .collect();
+    format::write_catalogue(folder.path(), &rows, false).unwrap();
+    let path = folder.path().join("catalogue.parquet");
+    let whole = fs::read(&path).unwrap();
+    let (mut read, mut refused) = (0, 0);
+    let mut look = |bytes: &[u8]| {
+        fs::write(&path, bytes).unwrap();
+        match format::read_catalogue(folder.path()) {
+            Ok(_) => read += 1,
+            Err(_) => refused += 1,
+        }
+        let report = validate(folder.path(), &Options::default()).unwrap();
+        assert!(!report.conformant, "none of its sequences is there");
+    };
+    for place in places(whole.len() - 10, 29) {
+        look(&whole[..place]);
+        let mut bytes = whole.clone();
+        bytes[place] ^= 1 << (place % 8);
+        look(&bytes);
+        bytes[place..place + 9].fill(0xff);
+        bytes[place + 9] = 0x01;
+        look(&bytes);
+    }
+    assert!(read > 0 && refused > read, "{read} read, {refused} refused");
+    assert!(peak_memory() < MEMORY_BOUND);
 }
 
 #[test]

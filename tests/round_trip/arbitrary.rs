@@ -80,6 +80,8 @@ struct Column {
     floats: Vec<f64>,
     bytes: Vec<u8>,
     offsets: Vec<i32>,
+    /// Where each text of a list of them ends in `bytes`, from 0.
+    texts: Vec<i32>,
     /// One bit a row, the first row at bit `BIT_OFFSET`.
     bits: Vec<u8>,
 }
@@ -88,7 +90,7 @@ const BIT_OFFSET: usize = 3;
 
 impl Column {
     fn new(kind: ColumnType, rows: usize, random: &mut Random) -> Self {
-        let mut column = Self { offsets: vec![0], ..Self::default() };
+        let mut column = Self { offsets: vec![0], texts: vec![0], ..Self::default() };
         column.bits = (0..(rows + BIT_OFFSET).div_ceil(8)).map(|_| random.next() as u8).collect();
         for _ in 0..rows {
             let length = random.below(5);
@@ -100,10 +102,17 @@ impl Column {
                 ColumnType::Binary => column.bytes.extend((0..length).map(|_| random.next() as u8)),
                 ColumnType::Int64List => column.integers.extend((0..length).map(|_| random.integer())),
                 ColumnType::Float64List => column.floats.extend((0..length).map(|_| random.float())),
+                ColumnType::Utf8List => {
+                    for _ in 0..length {
+                        column.bytes.extend_from_slice(random.text().as_bytes());
+                        column.texts.push(i32::try_from(column.bytes.len()).unwrap());
+                    }
+                }
             }
             let end = match kind {
                 ColumnType::Int64List => column.integers.len(),
                 ColumnType::Float64List => column.floats.len(),
+                ColumnType::Utf8List => column.texts.len() - 1,
                 _ => column.bytes.len(),
             };
             column.offsets.push(i32::try_from(end).unwrap());
@@ -151,6 +160,13 @@ impl ColumnSource for Columns {
     }
     fn utf8(&self, field: usize) -> Result<Lists<'_, u8>, Infallible> {
         Ok(self.columns[field].lists(&self.columns[field].bytes, false))
+    }
+    fn optional_utf8(&self, field: usize) -> Result<Lists<'_, u8>, Infallible> {
+        Ok(self.columns[field].lists(&self.columns[field].bytes, true))
+    }
+    fn utf8_list(&self, field: usize) -> Result<TextLists<'_>, Infallible> {
+        let Column { offsets, texts, bytes, .. } = &self.columns[field];
+        Ok(TextLists { offsets, texts: Lists { offsets: texts, values: bytes, validity: None } })
     }
     fn optional_binary(&self, field: usize) -> Result<Lists<'_, u8>, Infallible> {
         Ok(self.columns[field].lists(&self.columns[field].bytes, true))

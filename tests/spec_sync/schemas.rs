@@ -15,9 +15,19 @@ use crate::document::{read_spec, sync};
 use crate::ordered::Ordered;
 use crate::sample::{every_table, sample};
 
+/// Names of the JSON Schemas of what is in a sequence.
+fn names_in_sequences() -> Vec<&'static str> {
+    ["manifest", "table_summaries"].into_iter().chain(TABLES.iter().map(|table| table.name)).collect()
+}
+
 /// Names of all JSON Schemas.
 fn names() -> Vec<&'static str> {
-    ["manifest", "table_summaries"].into_iter().chain(TABLES.iter().map(|table| table.name)).collect()
+    names_in_sequences().into_iter().chain([CATALOGUE.name]).collect()
+}
+
+/// Every table, that of collections last.
+fn tables() -> impl Iterator<Item = &'static TableInfo> {
+    TABLES.iter().copied().chain([CATALOGUE])
 }
 
 fn file(name: &str) -> String {
@@ -56,8 +66,7 @@ fn no_other_schema_lies_there() {
 
 #[test]
 fn the_listing_of_arrow_schemas_is_that_of_the_code() {
-    let tables: Vec<Value> = TABLES
-        .iter()
+    let tables: Vec<Value> = tables()
         .map(|table| {
             let schema = arrow_schema(table);
             let fields: Vec<Value> = schema
@@ -127,7 +136,7 @@ fn every_member_of_a_schema_is_described() {
 
 #[test]
 fn arrow_schema_and_json_schema_have_the_same_columns_in_the_same_order() {
-    for table in TABLES {
+    for table in tables() {
         let arrow = arrow_schema(table);
         let schema = Ordered::parse(&json_schema(table.name).unwrap());
         let properties = schema.get("properties").unwrap().members();
@@ -216,6 +225,21 @@ fn rows_as_json_satisfy_their_schema() {
     rows_satisfy("manifest", &[&sequence.manifest]);
     let summary = TableSummary { table: "frames".to_owned(), rows: 1, sha256: "0".repeat(64) };
     rows_satisfy("table_summaries", &[summary]);
+    let full = CatalogueEntry {
+        description: Some("a".to_owned()),
+        dataset_sequence: Some("b".to_owned()),
+        licence: Some("c".to_owned()),
+        noise: Some("d".to_owned()),
+        first_stamp_nanos: Some(1),
+        last_stamp_nanos: Some(2),
+        path_length: Some(0.5),
+        min_x: Some(-1.0),
+        max_z: Some(1.0),
+        tables: vec!["frames".to_owned()],
+        estimates: vec!["point-ba".to_owned(), "mine".to_owned()],
+        ..CatalogueEntry::default()
+    };
+    rows_satisfy(CATALOGUE.name, &[full, CatalogueEntry::default()]);
 }
 
 #[test]
@@ -250,7 +274,7 @@ fn an_mcap_file_carries_the_very_same_schemas() {
             assert_eq!(String::from_utf8(schema.data.to_vec()).unwrap(), read_spec(&file(name)), "{name}");
         }
     }
-    assert_eq!(topics, names().into_iter().map(str::to_owned).collect());
+    assert_eq!(topics, names_in_sequences().into_iter().map(str::to_owned).collect());
 }
 
 #[test]

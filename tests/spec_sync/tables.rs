@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use open_structure::format::json_schema;
-use open_structure::structure::{Field, Need, Storage, TABLES, TableInfo, table_info};
+use open_structure::structure::{Field, Need, Storage, TABLES, TableInfo, any_table_info};
 
 use crate::ordered::Ordered;
 
@@ -36,7 +36,7 @@ pub(crate) fn overview() -> String {
 
 /// The columns of a table, after what is said of its rows.
 pub(crate) fn columns(name: &str) -> Option<String> {
-    let table = table_info(name)?;
+    let table = any_table_info(name)?;
     let mut text = format!("{}\n\nKey: {}.\n\n", table.description(), key(table));
     text.push_str("| name | type | unit | space | meaning |\n|---|---|---|---|---|\n");
     for Field { name, kind, nullable, unit, space, since, .. } in table.fields {

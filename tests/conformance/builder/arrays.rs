@@ -32,6 +32,7 @@ fn data_type(table: &Table, index: usize) -> DataType {
         Kind::Int32List => list(DataType::Int32),
         Kind::Float64List => list(DataType::Float64),
         Kind::Float32List => list(DataType::Float32),
+        Kind::Utf8List => list(DataType::Utf8),
     }
 }
 
@@ -87,7 +88,9 @@ fn array(column: &Column, stored: &DataType, cells: &[&Cell]) -> ArrayRef {
                 cells.iter().map(|cell| if let Cell::Bytes(bytes) = cell { Some(bytes) } else { None });
             Arc::new(values.collect::<BinaryArray>())
         }
-        Kind::Int64List | Kind::Int32List | Kind::Float64List | Kind::Float32List => list(stored, cells),
+        Kind::Int64List | Kind::Int32List | Kind::Float64List | Kind::Float32List | Kind::Utf8List => {
+            list(stored, cells)
+        }
     }
 }
 
@@ -100,7 +103,8 @@ fn list(stored: &DataType, cells: &[&Cell]) -> ArrayRef {
     let DataType::List(element) = stored else {
         return Arc::new(BooleanArray::from(vec![false; cells.len()]));
     };
-    let (mut ints, mut floats, mut lengths) = (Vec::new(), Vec::new(), Vec::with_capacity(cells.len()));
+    let (mut ints, mut floats, mut texts) = (Vec::new(), Vec::new(), Vec::new());
+    let mut lengths = Vec::with_capacity(cells.len());
     for cell in cells {
         lengths.push(match cell {
             Cell::Ints(values) => {
@@ -111,6 +115,10 @@ fn list(stored: &DataType, cells: &[&Cell]) -> ArrayRef {
                 floats.extend_from_slice(values);
                 values.len()
             }
+            Cell::Texts(values) => {
+                texts.extend_from_slice(values);
+                values.len()
+            }
             _ => 0,
         });
     }
@@ -118,6 +126,7 @@ fn list(stored: &DataType, cells: &[&Cell]) -> ArrayRef {
     let values: ArrayRef = match element.data_type() {
         DataType::Int32 => Arc::new(ints.into_iter().map(|value| value.map(narrow)).collect::<Int32Array>()),
         DataType::Float64 => Arc::new(Float64Array::from(floats)),
+        DataType::Utf8 => Arc::new(StringArray::from(texts)),
         DataType::Float32 => Arc::new(
             floats.into_iter().map(|value| value.map(|value| value as f32)).collect::<Float32Array>(),
         ),

@@ -9,21 +9,24 @@ use serde_json::{Map, Value};
 use super::edit::{Edit, set};
 use super::{Result, corpus_folder};
 
-/// One of the two encodings.
+/// One of the two encodings, or a collection of sequences.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Stored {
     Mcap,
     Parquet,
+    Collection,
 }
 
 impl Stored {
-    pub(crate) const ALL: [Self; 2] = [Self::Mcap, Self::Parquet];
+    /// Those that every case is stored as unless it says otherwise.
+    pub(crate) const USUAL: [Self; 2] = [Self::Mcap, Self::Parquet];
 
     pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Mcap => "mcap",
             Self::Parquet => "parquet",
+            Self::Collection => "collection",
         }
     }
 
@@ -32,6 +35,7 @@ impl Stored {
         match self {
             Self::Mcap => "sequence.mcap",
             Self::Parquet => "sequence",
+            Self::Collection => "collection",
         }
     }
 }
@@ -45,7 +49,7 @@ pub(crate) struct Expected {
     pub(crate) severity: String,
     /// The table concerned, where there is one.
     pub(crate) table: Option<String>,
-    /// The encodings in which it follows; both by default.
+    /// The encodings in which it follows; all by default.
     #[serde(default)]
     encodings: Vec<Stored>,
     /// Whether a validator may leave it out.
@@ -154,7 +158,7 @@ fn case(name: String, text: Value, base: &Value) -> Result<Case> {
     for (pointer, value) in &text.scene {
         set(&mut scene, pointer, Some(value).filter(|value| !value.is_null()))?;
     }
-    let encodings = if text.encodings.is_empty() { Stored::ALL.to_vec() } else { text.encodings };
+    let encodings = if text.encodings.is_empty() { Stored::USUAL.to_vec() } else { text.encodings };
     Ok(Case { name, title: text.title, encodings, scene, edits: text.edits, findings: text.findings })
 }
 

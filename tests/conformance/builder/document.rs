@@ -1,6 +1,6 @@
 //! A sequence as loose tables of cells: whatever can be stored can be said, right or wrong.
 
-use open_structure::structure::{ColumnType, TABLES, TableInfo, table_info};
+use open_structure::structure::{ColumnType, TABLES, TableInfo, any_table_info};
 use serde_json::{Map, Value};
 
 use super::Result;
@@ -20,9 +20,10 @@ pub(crate) enum Kind {
     Int32List,
     Float64List,
     Float32List,
+    Utf8List,
 }
 
-const KINDS: [(&str, Kind); 12] = [
+const KINDS: [(&str, Kind); 13] = [
     ("int64", Kind::Int64),
     ("int32", Kind::Int32),
     ("float64", Kind::Float64),
@@ -35,6 +36,7 @@ const KINDS: [(&str, Kind); 12] = [
     ("list<int32>", Kind::Int32List),
     ("list<float64>", Kind::Float64List),
     ("list<float32>", Kind::Float32List),
+    ("list<utf8>", Kind::Utf8List),
 ];
 
 impl Kind {
@@ -52,6 +54,7 @@ impl Kind {
             ColumnType::Binary => Self::Binary,
             ColumnType::Int64List => Self::Int64List,
             ColumnType::Float64List => Self::Float64List,
+            ColumnType::Utf8List => Self::Utf8List,
         }
     }
 }
@@ -67,6 +70,7 @@ pub(crate) enum Cell {
     Bytes(Vec<u8>),
     Ints(Vec<Option<i64>>),
     Floats(Vec<Option<f64>>),
+    Texts(Vec<Option<String>>),
 }
 
 impl From<i64> for Cell {
@@ -135,6 +139,16 @@ impl Cell {
                         .collect::<Result<_>>()?,
                 )
             }
+            Kind::Utf8List => Self::Texts(
+                list()?
+                    .iter()
+                    .map(|entry| match entry {
+                        Value::Null => Ok(None),
+                        Value::String(text) => Ok(Some(text.clone())),
+                        _ => Err(wrong()),
+                    })
+                    .collect::<Result<_>>()?,
+            ),
             Kind::Float64List | Kind::Float32List => Self::Floats(
                 list()?
                     .iter()
@@ -160,6 +174,7 @@ impl Cell {
                 Self::Floats(values.into_iter().map(|value| value.map(|value| value as f64)).collect())
             }
             (Self::Ints(values), Kind::Utf8) => Self::Text(format!("{values:?}")),
+            (Self::Texts(values), Kind::Utf8) => Self::Text(format!("{values:?}")),
             (Self::Floats(values), Kind::Float64) => Self::Float(values.into_iter().flatten().sum()),
             (same, _) => same,
         }
@@ -173,6 +188,10 @@ impl Cell {
         if let Self::Float(value) = self { Some(*value) } else { None }
     }
 
+    pub(crate) fn text(&self) -> Option<&str> {
+        if let Self::Text(value) = self { Some(value) } else { None }
+    }
+
     pub(crate) fn is_null(&self) -> bool {
         matches!(self, Self::Null)
     }
@@ -181,6 +200,7 @@ impl Cell {
         match self {
             Self::Ints(values) => values.contains(&None),
             Self::Floats(values) => values.contains(&None),
+            Self::Texts(values) => values.contains(&None),
             _ => false,
         }
     }
@@ -226,7 +246,7 @@ pub(crate) struct Table {
 impl Table {
     /// A table of the specification, without rows.
     pub(crate) fn known(name: &str) -> Result<Self> {
-        let info = table_info(name).ok_or_else(|| format!("no table is called {name}"))?;
+        let info = any_table_info(name).ok_or_else(|| format!("no table is called {name}"))?;
         let columns = info.fields.iter().map(|field| Column {
             notes: vec![
                 ("description", field.description()),

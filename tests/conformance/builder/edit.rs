@@ -103,6 +103,12 @@ pub(crate) enum Edit {
     File { name: String, text: String },
     /// Takes a file out of the Parquet folder.
     DropFile { name: String },
+    /// Renames a folder of a collection.
+    RenameFolder { from: String, to: String },
+    /// Takes a folder out of a collection.
+    DropFolder { name: String },
+    /// Gives a sequence of a collection another name in its manifest, its folder and its row as they were.
+    NameSequence { sequence: String, name: String },
     /// Changes the bytes of the MCAP file, or of one file of the folder.
     Bytes(super::bytes::BytesEdit),
 }

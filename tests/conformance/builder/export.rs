@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use super::{Case, Expected, Result, cases, document, store};
 
 /// Version of the layout that [`export`] writes, as `major.minor.patch`.
-pub(crate) const CORPUS_VERSION: &str = "1.0.0";
+pub(crate) const CORPUS_VERSION: &str = "1.1.0";
 
 /// What `expected.json` says of a finding.
 fn finding(expected: &Expected) -> Value {
@@ -43,8 +43,8 @@ fn expected(case: &Case) -> Value {
     json
 }
 
-/// Writes every case below a folder that is not there yet: `<case>/sequence.mcap`, `<case>/sequence/` and
-/// `<case>/expected.json`, and the list of all in `corpus.json`. Returns the cases.
+/// Writes every case below a folder that is not there yet: `<case>/sequence.mcap`, `<case>/sequence/` or
+/// `<case>/collection/`, and `<case>/expected.json`, and the list of all in `corpus.json`. Returns the cases.
 pub(crate) fn export(output: &Path) -> Result<Vec<Case>> {
     if output.exists() {
         return Err(format!("{}: exists already", output.display()));

@@ -6,6 +6,7 @@
 mod arrays;
 mod bytes;
 mod case;
+mod collection;
 mod derive;
 mod document;
 mod edit;
@@ -34,7 +35,7 @@ fn corpus_folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/conformance")
 }
 
-/// Stores a case's document under a path: an MCAP file, or a Parquet folder.
+/// Stores a case's document under a path: an MCAP file, a Parquet folder, or a collection of such folders.
 fn store(case: &Case, document: &Document, stored: Stored, path: &Path) -> Result<()> {
     match stored {
         Stored::Mcap => {
@@ -42,6 +43,7 @@ fn store(case: &Case, document: &Document, stored: Stored, path: &Path) -> Resul
             bytes::edit(&mut bytes, None, &case.edits)?;
             fs::write(path, bytes).map_err(|error| format!("{}: {error}", path.display()))
         }
+        Stored::Collection => collection::store(document, &case.edits, path),
         Stored::Parquet => {
             let mut files = parquet_files::encode(document, &case.edits)?;
             for (name, bytes) in &mut files {
@@ -60,16 +62,17 @@ fn store(case: &Case, document: &Document, stored: Stored, path: &Path) -> Resul
 /// were edited, and counts and digests last of all, so that nothing but the named defect is wrong.
 fn document(case: &Case) -> Result<Document> {
     let mut document = scene::expand(&case.scene)?;
+    let of_sequence = || case.edits.iter().filter(|edit| !edit.is_of_collection());
     let late = |edit: &Edit| edit.table().is_some_and(|table| derive::DERIVED.contains(&table));
-    for edit in case.edits.iter().filter(|edit| !late(edit)) {
+    for edit in of_sequence().filter(|edit| !late(edit)) {
         edit.apply(&mut document)?;
     }
     derive::tables(&mut document);
-    for edit in case.edits.iter().filter(|edit| late(edit)) {
+    for edit in of_sequence().filter(|edit| late(edit)) {
         edit.apply(&mut document)?;
     }
     derive::summaries(&mut document);
-    for edit in &case.edits {
+    for edit in of_sequence() {
         edit.apply_to_summaries(&mut document)?;
     }
     Ok(document)

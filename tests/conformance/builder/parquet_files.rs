@@ -33,12 +33,7 @@ pub(crate) struct Options {
 
 /// The files of the folder, by name.
 pub(crate) fn encode(document: &Document, edits: &[Edit]) -> Result<BTreeMap<String, Vec<u8>>> {
-    let mut options = Options::default();
-    for edit in edits {
-        if let Edit::Parquet(chosen) = edit {
-            options = chosen.clone();
-        }
-    }
+    let options = options(edits);
     let mut files = BTreeMap::new();
     let version = document.manifest["spec_version"].as_str().unwrap_or("1.0.0");
     for table in &document.tables {
@@ -51,6 +46,21 @@ pub(crate) fn encode(document: &Document, edits: &[Edit]) -> Result<BTreeMap<Str
     }
     let text = serde_json::to_string_pretty(&manifest).map_err(|error| error.to_string())?;
     files.insert("sequence.json".to_owned(), document.manifest_text.clone().unwrap_or(text).into_bytes());
+    edit_files(&mut files, edits)?;
+    Ok(files)
+}
+
+/// The last choice of how files are written.
+pub(crate) fn options(edits: &[Edit]) -> Options {
+    let chosen = edits.iter().rev().find_map(|edit| match edit {
+        Edit::Parquet(chosen) => Some(chosen.clone()),
+        _ => None,
+    });
+    chosen.unwrap_or_default()
+}
+
+/// Adds files to a folder, and takes files out.
+pub(crate) fn edit_files(files: &mut BTreeMap<String, Vec<u8>>, edits: &[Edit]) -> Result<()> {
     for edit in edits {
         match edit {
             Edit::File { name, text } => {
@@ -62,10 +72,11 @@ pub(crate) fn encode(document: &Document, edits: &[Edit]) -> Result<BTreeMap<Str
             _ => {}
         }
     }
-    Ok(files)
+    Ok(())
 }
 
-fn file(table: &Table, version: &str, options: &Options) -> Result<Vec<u8>> {
+/// The file of a table.
+pub(crate) fn file(table: &Table, version: &str, options: &Options) -> Result<Vec<u8>> {
     let compression = match options.compression.as_deref() {
         None | Some("none") => Compression::UNCOMPRESSED,
         Some("snappy") => Compression::SNAPPY,

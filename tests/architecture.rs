@@ -41,6 +41,10 @@ const ROOMS: &[(&str, &[&str])] = &[
             "plot",
         ],
     ),
+    (
+        "stations",
+        &["geometry", "structure", "datasets", "simulate", "track", "covisibility", "adjust", "evaluate"],
+    ),
     ("validate", &["geometry", "structure", "format", "simulate", "track", "adjust", "evaluate"]),
     ("report", &["geometry", "structure", "format", "statistics", "plot", "evaluate", "validate"]),
     (
@@ -61,6 +65,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "evaluate",
             "exchange",
             "benchmark",
+            "stations",
             "validate",
             "report",
         ],

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use open_structure::simulate::{self, Recipe};
+use open_structure::simulate::{Recipe, names};
 use open_structure::stations;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -15,7 +15,7 @@ use crate::work;
 /// Names of the recipes that travel with the package: the simulated sequences of the paper.
 #[pyfunction]
 pub(crate) fn recipes() -> Vec<&'static str> {
-    simulate::names()
+    names()
 }
 
 /// A sequence out of a recipe: a scene, a path through it, what each frame sees, and noise.

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use open_structure::validate::{self, Options, Report};
+use open_structure::validate::{Options, Report, validate as validate_path, validate_sequence};
 use pyo3::prelude::*;
 
 use crate::errors;
@@ -19,7 +19,7 @@ pub(crate) fn validate(py: Python<'_>, path: PathBuf, max_findings: usize) -> Py
     let report = work::run(py, errors::of_validate, |watch| {
         let progress = |_, _| watch.progress();
         let options = Options { listed: max_findings, progress: Some(&progress), ..Options::default() };
-        validate::validate(&path, &options)
+        validate_path(&path, &options)
     })?;
     as_python(py, &report)
 }
@@ -32,7 +32,7 @@ pub(crate) fn of_source<'py>(py: Python<'py>, source: &Source, max_findings: usi
             let report = work::run(py, errors::of_validate, |watch| {
                 let progress = |_, _| watch.progress();
                 let options = Options { listed: max_findings, progress: Some(&progress), ..Options::default() };
-                Ok(validate::validate_sequence(sequence, &options))
+                Ok(validate_sequence(sequence, &options))
             })?;
             as_python(py, &report)
         }

@@ -75,7 +75,10 @@ fn side_by_side<T: Send, E: Send>(
         };
         let worker = match thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, worker) {
             Ok(worker) => worker,
-            Err(cause) => return (Err(Box::new(format!("no thread: {cause}"))), None),
+            Err(cause) => {
+                let panic: Box<dyn Any + Send> = Box::new(format!("no thread: {cause}"));
+                return (Err(panic), None);
+            }
         };
         let mut interrupt = None;
         while wait.recv_timeout(PATIENCE) == Err(RecvTimeoutError::Timeout) {

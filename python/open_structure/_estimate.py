@@ -57,10 +57,10 @@ def packed(kind: str, given: Any) -> tuple[bytes, bytes, list[list[float] | None
 
 def has(given: Any, name: str) -> bool:
     """Whether a table or mapping has a column."""
+    if isinstance(given, Mapping):
+        return name in given
     names = getattr(given, "column_names", None)
-    if names is None:
-        names = given.keys() if isinstance(given, Mapping) else getattr(given, "columns", ())
-    return name in list(names)
+    return name in list(getattr(given, "columns", ()) if names is None else names)
 
 
 def column(kind: str, given: Any, name: str) -> Any:
@@ -119,7 +119,7 @@ def shaped(kind: str, rows: Kind, count: int, numbers: Numbers) -> Numbers:
 def from_matrices(matrices: Numbers) -> Numbers:
     """Translation and quaternion x, y, z, w of rigid transforms."""
     rotations, translations = matrices[:, :3, :3], matrices[:, :3, 3]
-    row = first(~np.isfinite(matrices).all(axis=(1, 2)))
+    row = first(np.logical_not(np.isfinite(matrices)).any(axis=(1, 2)))
     if row is not None:
         raise OptionError(f"poses row {row}: expected finite numbers, found {matrices[row].tolist()}")
     off = np.abs(rotations @ rotations.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2), initial=0.0)
@@ -148,9 +148,10 @@ def quaternions(r: Numbers) -> Numbers:
     return vectors
 
 
-def first(wrong: npt.NDArray[np.bool_]) -> int | None:
+def first(wrong: npt.ArrayLike) -> int | None:
     """The first row that is wrong."""
-    return int(np.argmax(wrong)) if wrong.any() else None
+    rows = np.flatnonzero(wrong)
+    return int(rows[0]) if rows.size else None
 
 
 def covariance(kind: str, rows: Kind, row: Any) -> list[float] | None:

@@ -16,12 +16,12 @@ FUZZ_ARGS ?=
 # Tests, benchmarks and examples stop at what they did not expect, and need not be pretty.
 TESTS_MAY := $(addprefix --allow clippy::,pedantic unwrap_used expect_used print_stdout print_stderr)
 
-.PHONY: help setup demo test lint bench bench-baseline bench-figures bench-instructions bench-instructions-baseline bench-peers bench-scale paper-table fuzz conformance-corpus spec page book package
+.PHONY: help setup demo test lint bench bench-baseline bench-figures bench-instructions bench-instructions-baseline bench-peers bench-scale paper-table fuzz conformance-corpus spec page book package wheel
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
 	@echo 'make bench | bench-baseline | bench-figures | bench-instructions | bench-instructions-baseline'
-	@echo 'make bench-peers | bench-scale | paper-table | fuzz | conformance-corpus | spec | page | book | package | setup'
+	@echo 'make bench-peers | bench-scale | paper-table | fuzz | conformance-corpus | spec | page | book | package | wheel | setup'
 
 setup: ## what the other targets need
 	@.ci/setup
@@ -99,6 +99,10 @@ page:
 book:
 	@command -v mdbook > /dev/null || cargo install mdbook --locked --no-default-features --features search
 	mdbook build docs
+
+# The Python wheel, into out/wheel, installed into an environment of its own and tried.
+wheel:
+	@packaging/wheel
 
 # Debian packages and a tarball, into out/package, and a look whether all is in them.
 package:

@@ -17,6 +17,7 @@ pub mod geometry;
 pub mod plot;
 pub mod report;
 pub mod simulate;
+pub mod stations;
 pub mod statistics;
 pub mod storage;
 pub mod structure;

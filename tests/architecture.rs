@@ -43,6 +43,20 @@ const ROOMS: &[(&str, &[&str])] = &[
             "plot",
         ],
     ),
+    (
+        "stations",
+        &[
+            "geometry",
+            "structure",
+            "storage",
+            "datasets",
+            "simulate",
+            "track",
+            "covisibility",
+            "adjust",
+            "evaluate",
+        ],
+    ),
     ("validate", &["geometry", "structure", "storage", "format", "simulate", "track", "adjust", "evaluate"]),
     ("report", &["geometry", "structure", "storage", "format", "statistics", "plot", "evaluate", "validate"]),
     (
@@ -63,6 +77,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "evaluate",
             "exchange",
             "benchmark",
+            "stations",
             "validate",
             "report",
             "storage",
@@ -252,7 +267,7 @@ fn every_room_and_every_file_says_what_it_is_for() {
             wrong.push(format!("src/{room} has no mod.rs"));
         }
     }
-    for (path, text) in files("src").into_iter().chain(files("converters/src")) {
+    for (path, text) in ["src", "converters/src", "python/src"].into_iter().flat_map(files) {
         let first = text.lines().next().unwrap_or_default();
         if first.strip_prefix("//! ").is_none_or(|words| words.len() <= 10) && !path.ends_with("/tests.rs") {
             wrong.push(format!("{path} begins with `{first}`, not with what it is for"));
@@ -263,7 +278,7 @@ fn every_room_and_every_file_says_what_it_is_for() {
 
 #[test]
 fn there_is_no_room_for_leftovers() {
-    for (path, _) in files("src").into_iter().chain(files("converters/src")) {
+    for (path, _) in ["src", "converters/src", "python/src"].into_iter().flat_map(files) {
         let leftovers = ["utils", "util", "helpers", "common", "misc"];
         assert!(path.split(['/', '.']).all(|name| !leftovers.contains(&name)), "{path}: one noun, one file");
     }

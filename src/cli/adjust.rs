@@ -1,23 +1,23 @@
 //! `os adjust`: a factor graph into an estimate.
 
-use std::collections::BTreeSet;
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use anyhow::Context;
 
-use super::adjust_words::{as_json, as_text};
+use super::adjust_words::as_text;
 use super::foreign::{self, Foreign};
 use super::progress::Progress;
 use super::{Outcome, adjust_foreign, extended, parsed};
 use crate::adjust::{
-    Adjusted, Eliminate, Error, Factorisation, LineKind, Loss, Method, Optimiser, Options, Parallelism,
-    PointForm, SolverOptions, Step, Summary, adjust_watched,
+    Eliminate, Error, Factorisation, LineKind, Loss, Method, Optimiser, Options, Parallelism, PointForm,
+    SolverOptions, Step, Summary,
 };
 use crate::format;
+use crate::stations::{self, AdjustRequest};
 use crate::storage;
-use crate::structure::{Estimate, FactorGraph, FrameId, Sequence};
+use crate::structure::FrameId;
 
 /// Adjust a factor graph: move poses and landmarks to where the measurements agree best.
 ///
@@ -271,24 +271,23 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         })?;
     }
     adjust_foreign::refuse_output_of_others(&args.output)?;
-    let (mut sequence, mut outcome) = extended::read(&args.input, &args.output, args.force)?;
-    extended::check_cameras(&sequence)?;
-    let options = args.options(Method::default());
-    let name = options.estimate_name().to_owned();
-    extended::check_name("an estimate", &name, Estimate::is_in(&sequence, &name), args.replace)?;
-    let graph = pick(args.graph.as_deref(), &mut sequence)?;
+    let (sequence, mut outcome) = extended::read(&args.input, &args.output, args.force)?;
+    let graph = stations::graph_to_adjust(&sequence, args.graph.as_deref())?;
     if args.graph.is_none() {
-        writeln!(io::stderr(), "adjusting the graph `{}`", graph.name)?;
+        writeln!(io::stderr(), "adjusting the graph `{graph}`")?;
     }
-    let (Adjusted { estimate, summary }, took) =
-        args.watched(|watch| adjust_watched(&graph, &options, watch))?;
-    outcome = args.outcome(&summary, outcome)?;
-    let graph_name = graph.name.clone();
-    graph.put(&mut sequence);
-    estimate.put(&mut sequence);
-    sequence.sort();
-    let size = extended::write(&args.output, sequence, args.force)?;
-    args.tell([&graph_name, &name], &summary, took, &size, stdout)?;
+    let request = AdjustRequest {
+        options: args.options(Method::default()),
+        graph: Some(graph),
+        replace: args.replace,
+        threads: args.threads,
+    };
+    let progress = args.progress();
+    let found = stations::adjust(sequence, &request, &mut args.watch(&progress))?;
+    drop(progress);
+    outcome = args.outcome(&found.summary, outcome)?;
+    let size = extended::write(&args.output, found.sequence, args.force)?;
+    args.tell([&found.graph, &found.estimate], &found.summary, found.took, &size, stdout)?;
     Ok(outcome)
 }
 
@@ -298,22 +297,30 @@ impl Args {
         &self,
         adjust: impl FnOnce(&mut dyn FnMut(&Step) -> bool) -> Result<T, Error> + Send,
     ) -> anyhow::Result<(T, Duration)> {
-        let progress = Progress::new("adjusting", "steps");
-        let most = self.solver(SolverOptions::default()).max_iterations as u64;
-        let mut done = 0;
-        let run = || {
-            adjust(&mut |_| {
-                done += 1;
-                progress.update(done, most.max(done));
-                true
-            })
-        };
+        let progress = self.progress();
+        let mut watch = self.watch(&progress);
+        let run = || adjust(&mut watch);
         let start = Instant::now();
         let adjusted = match self.threads {
             Some(threads) => rayon::ThreadPoolBuilder::new().num_threads(threads).build()?.install(run),
             None => run(),
         };
         Ok((adjusted?, start.elapsed()))
+    }
+
+    fn progress(&self) -> Progress {
+        Progress::new("adjusting", "steps")
+    }
+
+    /// Shows each step on a progress bar.
+    fn watch(&self, progress: &Progress) -> impl FnMut(&Step) -> bool + Send {
+        let most = self.solver(SolverOptions::default()).max_iterations as u64;
+        let mut done = 0;
+        move |_| {
+            done += 1;
+            progress.update(done, most.max(done));
+            true
+        }
     }
 
     /// Says the plan where it is asked for, and what is left to be desired.
@@ -344,7 +351,7 @@ impl Args {
         stdout: &mut dyn Write,
     ) -> anyhow::Result<()> {
         if self.json {
-            serde_json::to_writer_pretty(&mut *stdout, &as_json(graph, name, summary, took))?;
+            serde_json::to_writer_pretty(&mut *stdout, &stations::adjust_json(graph, name, summary, took))?;
             writeln!(stdout)?;
         } else {
             write!(stdout, "{}", as_text(graph, name, summary))?;
@@ -352,22 +359,4 @@ impl Args {
         }
         Ok(())
     }
-}
-
-/// Takes the graph of a name, or the one that is meant where none is given, out of a sequence.
-fn pick(name: Option<&str>, sequence: &mut Sequence) -> anyhow::Result<FactorGraph> {
-    let names = FactorGraph::names(sequence);
-    let list = |names: &BTreeSet<String>| names.iter().cloned().collect::<Vec<_>>().join(", ");
-    if let Some(name) = name {
-        let known = || format!("no graph `{name}`; there are: {}", list(&names));
-        return FactorGraph::take(sequence, name).with_context(known);
-    }
-    let usual = ["initial", "map-to-frame", "frame-to-frame"];
-    let picked = match names.len() {
-        0 => anyhow::bail!("the sequence has no factor graph; `os graph` makes one of an estimate"),
-        1 => names.first().map(String::as_str),
-        _ => usual.into_iter().find(|name| names.contains(*name)),
-    };
-    let picked = picked.with_context(|| format!("which graph? --graph takes one of: {}", list(&names)))?;
-    FactorGraph::take(sequence, picked).context("the graph is empty")
 }

@@ -20,6 +20,7 @@ use crate::exchange::{
     read_g2o, with_estimate,
 };
 use crate::format::{self, Partial};
+use crate::stations::check_name;
 use crate::storage;
 use crate::structure::{FactorGraph, Sequence, registry};
 
@@ -185,7 +186,7 @@ fn run_bal(args: &Args, as_file: bool, stdout: &mut dyn Write) -> anyhow::Result
 }
 
 fn names(args: &Args) -> anyhow::Result<ImportNames> {
-    extended::check_name("an estimate", args.name.as_deref().unwrap_or(BAL_ESTIMATE), false, false)?;
+    check_name("an estimate", args.name.as_deref().unwrap_or(BAL_ESTIMATE), false, false)?;
     Ok(ImportNames { sequence: name(None, &args.input)?, graph: GRAPH.to_owned() })
 }
 

@@ -1,8 +1,4 @@
-//! How an adjustment went, for people and as JSON.
-
-use std::time::Duration;
-
-use serde_json::json;
+//! How an adjustment went, for people.
 
 use super::text;
 use crate::adjust::{Summary, Tally};
@@ -76,46 +72,4 @@ fn tallies(summary: &Summary) -> [(&'static str, &Tally); 6] {
         ("of lines", &summary.line_factors),
         ("relative", &summary.relative_factors),
     ]
-}
-
-/// * `took` — the adjustment alone, without reading and writing.
-pub(super) fn as_json(graph: &str, name: &str, summary: &Summary, took: Duration) -> serde_json::Value {
-    let tally = |tally: &Tally| {
-        let excluded: serde_json::Map<_, _> =
-            tally.excluded.iter().map(|(reason, count)| (reason.words().to_owned(), json!(count))).collect();
-        json!({ "used": tally.used, "excluded": excluded })
-    };
-    let ids = |frames: &[FrameId]| frames.iter().map(|frame| frame.0).collect::<Vec<_>>();
-    json!({
-        "graph": graph,
-        "estimate": name,
-        "ending": summary.ending.words(),
-        "converged": summary.ending.has_converged(),
-        "iterations": summary.iterations,
-        "seconds": took.as_secs_f64(),
-        "initial_cost": summary.initial_cost,
-        "final_cost": summary.final_cost,
-        "residual_rms_sigma": summary.residual_rms,
-        "residuals": summary.residuals,
-        "unknowns": summary.unknowns,
-        "components": summary.components,
-        "poses": tally(&summary.poses),
-        "points": tally(&summary.points),
-        "lines": tally(&summary.lines),
-        "point_factors": tally(&summary.point_factors),
-        "line_factors": tally(&summary.line_factors),
-        "relative_factors": tally(&summary.relative_factors),
-        "held": ids(&summary.held),
-        "weak": ids(&summary.weak),
-        "carried": ids(&summary.carried),
-        "unconstrained": ids(&summary.unconstrained),
-        "behind": summary.behind.iter().map(|point| point.0).collect::<Vec<_>>(),
-        "grouped_lines": summary.grouped,
-        "released_lines": summary.released.iter().map(|line| json!({
-            "line_id": line.line_id.0,
-            "group_id": line.group_id.0,
-            "angle_deg": line.angle_rad.to_degrees(),
-            "chi_squared": line.chi_squared,
-        })).collect::<Vec<_>>(),
-    })
 }

@@ -9,13 +9,14 @@ use clap::ValueEnum;
 
 use super::{Outcome, evaluate_files, evaluate_output, evaluate_shown, inputs, parsed};
 use crate::evaluate::{
-    Alignment, AlignmentKind, Delta, EvaluateOptions, Evaluated, Reconstruction, Relation, Step, evaluate,
+    Alignment, AlignmentKind, Delta, EvaluateOptions, Evaluated, Reconstruction, Relation, Step,
     summary_table,
 };
 use crate::format;
 use crate::plot;
+use crate::stations::{self, EvaluateRequest};
 use crate::storage;
-use crate::structure::{FrameId, LineLandmark, MapLine, MapPoint, PointLandmark, TrajectoryPose};
+use crate::structure::{FrameId, Sequence};
 
 /// Compare estimates with the truth: absolute and relative errors of trajectories as evo defines them, errors of maps.
 ///
@@ -219,53 +220,25 @@ fn complaints(rows: &[Evaluated]) -> anyhow::Result<Outcome> {
 
 /// Compares the estimates of a sequence.
 fn sequence(args: &Args, path: &Path, options: &EvaluateOptions) -> anyhow::Result<Compared> {
-    let shown = path.display();
     let reader = format::open(path)?;
-    let frames = reader.frame_list()?;
-    let trajectories = reader.table::<TrajectoryPose>()?;
-    let (points, lines) = (reader.table::<MapPoint>()?, reader.table::<MapLine>()?);
-    let mut names: Vec<&str> = trajectories.iter().map(|row| row.estimate.as_str()).collect();
-    names.extend(points.iter().map(|row| row.estimate.as_str()));
-    names.extend(lines.iter().map(|row| row.estimate.as_str()));
-    names.sort_unstable();
-    names.dedup();
-    let there = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-    let named = |name: &str| {
-        if !names.contains(&name) {
-            anyhow::bail!("{shown}: expected an estimate {name}, found {there}");
-        }
-        Reconstruction::named(name, &trajectories, &points, &lines)
-            .with_context(|| format!("{shown}, {name}"))
+    let mut read = Sequence {
+        frames: reader.frame_list()?.to_vec(),
+        trajectories: reader.table()?,
+        map_points: reader.table()?,
+        map_lines: reader.table()?,
+        ..Sequence::default()
     };
-    let reference = if args.reference == Reconstruction::TRUTH {
-        let truth = Reconstruction::truth(
-            frames,
-            &reader.table::<PointLandmark>()?,
-            &reader.table::<LineLandmark>()?,
-        )
-        .with_context(|| shown.to_string())?;
-        if truth.poses().is_empty() {
-            anyhow::bail!(
-                "{shown}: expected frames with true poses, found none; --reference NAME compares with an estimate ({there})"
-            );
-        }
-        truth
-    } else {
-        named(&args.reference)?
-    };
-    let wanted: Vec<&str> = if args.estimate.is_empty() {
-        names.iter().copied().filter(|name| *name != args.reference).collect()
-    } else {
-        args.estimate.iter().map(String::as_str).collect()
-    };
-    if wanted.is_empty() {
-        anyhow::bail!("{shown}: expected an estimate to compare, found {there}");
+    if args.reference == Reconstruction::TRUTH {
+        (read.point_landmarks, read.line_landmarks) = (reader.table()?, reader.table()?);
     }
-    let mut rows = Vec::new();
-    for name in wanted {
-        let evaluation = evaluate(&reference, &named(name)?, options);
-        rows.push(evaluated(&name_of(path), &args.reference, evaluation, options));
-    }
+    let request = EvaluateRequest {
+        estimates: args.estimate.clone(),
+        reference: args.reference.clone(),
+        options: *options,
+    };
+    let rows =
+        stations::evaluate(&name_of(path), &read, &request).with_context(|| path.display().to_string())?;
+    let frames = &read.frames;
     let upward = plot::upward(&reader.manifest().cameras, frames);
     Ok(Compared {
         rows,
@@ -280,23 +253,6 @@ pub(super) fn name_of(path: &Path) -> String {
         return inputs::called(path).unwrap_or_else(|| path.display().to_string());
     }
     path.file_stem().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
-}
-
-/// A result with the names that tell it apart.
-pub(super) fn evaluated(
-    sequence: &str,
-    reference: &str,
-    evaluation: crate::evaluate::Evaluation,
-    options: &EvaluateOptions,
-) -> Evaluated {
-    let pairs = if options.step.all_pairs { ", all pairs" } else { "" };
-    Evaluated {
-        sequence: sequence.to_owned(),
-        reference: reference.to_owned(),
-        evaluation,
-        alignment: options.alignment.to_string(),
-        step: format!("{}{pairs}", options.step.delta),
-    }
 }
 
 impl Args {

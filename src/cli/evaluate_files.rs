@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 
-use super::evaluate::{Compared, evaluated, name_of};
+use super::evaluate::{Compared, name_of};
 use crate::evaluate::{Error, EvaluateOptions, Matched, evaluate_matched};
 use crate::geometry::Pose;
 use crate::plot;
+use crate::stations::evaluated;
 use crate::storage::File;
 use crate::structure::{CameraId, Frame, FrameId, TrajectoryRow, read_trajectory};
 

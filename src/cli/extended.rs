@@ -9,9 +9,6 @@ use crate::format::{self, WriteOptions};
 use crate::storage;
 use crate::structure::{Sequence, registry};
 
-/// What the true poses are called where an estimate may be named.
-const TRUTH: &str = "truth";
-
 /// A whole sequence that is to be extended, and whether something of it will be left behind.
 ///
 /// Refuses an output that could not be written in the end, before any work.
@@ -39,29 +36,4 @@ pub(super) fn write(output: &Path, mut sequence: Sequence, force: bool) -> anyho
     sequence.manifest.tables.clear();
     format::write(output, &sequence, WriteOptions { force, ..WriteOptions::default() })?;
     Ok(text::bytes(storage::size(output)))
-}
-
-/// Refuses a name that is taken already, unless it is to be replaced.
-pub(super) fn check_name(kind: &str, name: &str, is_taken: bool, replace: bool) -> anyhow::Result<()> {
-    anyhow::ensure!(!name.is_empty(), "an empty name is no name of {kind}");
-    anyhow::ensure!(name != TRUTH, "`{TRUTH}` is no name of {kind}: it stands for the true poses");
-    anyhow::ensure!(
-        !is_taken || replace,
-        "the sequence has {kind} `{name}` already: choose another name with --name, or replace it with --replace"
-    );
-    Ok(())
-}
-
-/// Refuses cameras that project otherwise than estimators here do.
-pub(super) fn check_cameras(sequence: &Sequence) -> anyhow::Result<()> {
-    for camera in &sequence.manifest.cameras {
-        anyhow::ensure!(
-            camera.model == registry::PINHOLE,
-            "sequence.json: {}: expected the model `{}`, found `{}`",
-            camera.camera_id,
-            registry::PINHOLE,
-            camera.model
-        );
-    }
-    Ok(())
 }

@@ -8,6 +8,7 @@ use clap::ValueEnum;
 
 use super::{Outcome, extended, text};
 use crate::exchange::{MatchBy, MatchOptions, match_trajectory};
+use crate::stations::check_name;
 use crate::storage::File;
 use crate::structure::{Estimate, TrajectoryFormat, read_trajectory};
 
@@ -78,7 +79,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         bail!("--t-max-diff: expected seconds from 0 to 1e9, found {}", args.t_max_diff);
     }
     let (mut sequence, mut outcome) = extended::read(&args.sequence, &args.output, args.force)?;
-    extended::check_name("an estimate", &args.name, Estimate::is_in(&sequence, &args.name), args.replace)?;
+    check_name("an estimate", &args.name, Estimate::is_in(&sequence, &args.name), args.replace)?;
     let file = File::open(&args.trajectory).with_context(|| args.trajectory.display().to_string())?;
     let from = args.from.map(|from| match from {
         Format::Tum => TrajectoryFormat::Tum,

@@ -1,6 +1,5 @@
 //! `os measure`: observations into measurements.
 
-use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -15,11 +14,12 @@ use crate::format::{
     self, Chunk, Realisation, SequenceReader, SequenceWriter, WriteOptions, write_realisations,
 };
 use crate::simulate::noise::{NoiseModel, NoiseRecipe};
+use crate::stations::{self, MeasureRequest};
 use crate::storage;
 use crate::structure::{
     FrameBundle, GraphFactor, GraphLine, GraphPoint, GraphPose, LineLandmark, LineMeasurement,
-    LineObservation, Manifest, MapLine, MapPoint, PointLandmark, PointMeasurement, PointObservation, Record,
-    Recovery, StructuralGroup, TrajectoryPose, registry,
+    LineObservation, MapLine, MapPoint, PointLandmark, PointMeasurement, PointObservation, Record,
+    StructuralGroup, TrajectoryPose, registry,
 };
 
 /// Most realisations at once: each has a file open for every table, and rows that wait.
@@ -218,38 +218,14 @@ fn complete_depths(
 ) -> anyhow::Result<Outcome> {
     let mut outcome = Outcome::Done;
     let input = format::read(&args.sequence)?;
-    if input.point_measurements.is_empty() && input.line_measurements.is_empty() {
-        anyhow::bail!("{}: has no measurements whose depth could be completed", args.sequence.display());
-    }
     if !args.keep_estimates {
         tell_dropped(&format::open(&args.sequence)?)?;
     }
     for (seed, path) in outputs {
-        let mut sequence = input.clone();
-        let done = recipe.complete_depths(&mut sequence, *seed);
-        sequence.manifest = manifest(&input.manifest, recipe, *seed, args.keep_estimates);
-        // Pixels stay as they were measured, and so does what was declared of them.
-        if let Some(noise) = input.manifest.noise.as_ref().filter(|noise| noise.model == recipe.model.name())
-        {
-            sequence.manifest.noise = Some(noise.clone());
-        }
-        sequence.manifest.recovered.clone_from(&input.manifest.recovered);
-        for (table, rows) in [("point_measurements", done.points), ("line_measurements", done.line_ends)] {
-            if rows > 0 {
-                sequence.manifest.recovered.push(completed(table, rows));
-            }
-        }
-        if !args.keep_estimates {
-            sequence.trajectories.clear();
-            sequence.map_points.clear();
-            sequence.map_lines.retain(|row| row.estimate == registry::UNREFINED);
-            sequence.tracking.clear();
-            sequence.iterations.clear();
-            sequence.graph_poses.clear();
-            sequence.graph_points.clear();
-            sequence.graph_lines.clear();
-            sequence.graph_factors.clear();
-        }
+        let request =
+            MeasureRequest { recipe: recipe.clone(), seed: *seed, keep_estimates: args.keep_estimates };
+        let (sequence, done) = stations::complete_depths(&input, &request)
+            .with_context(|| args.sequence.display().to_string())?;
         format::write(path, &sequence, WriteOptions { force: args.force, ..WriteOptions::default() })?;
         writeln!(
             stdout,
@@ -266,20 +242,6 @@ fn complete_depths(
         }
     }
     Ok(outcome)
-}
-
-/// What a manifest says about depths that were drawn.
-fn completed(table: &str, rows: usize) -> Recovery {
-    let columns =
-        if table == PointMeasurement::TABLE.name { &["depth"][..] } else { &["start_depth", "end_depth"] };
-    let columns = columns.iter().map(|column| (*column).to_owned()).collect();
-    Recovery {
-        table: table.to_owned(),
-        columns,
-        rows: rows as u64,
-        method: "drawn about the depth of the landmark in the true camera, by the noise model".to_owned(),
-        ids: Vec::new(),
-    }
 }
 
 /// Refuses what could not be written in the end, before any work.
@@ -318,37 +280,6 @@ fn tell_dropped(reader: &SequenceReader) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The manifest of an output.
-fn manifest(input: &Manifest, recipe: &NoiseRecipe, seed: u64, keep_estimates: bool) -> Manifest {
-    let mut manifest = input.clone();
-    registry::SPEC_VERSION.clone_into(&mut manifest.spec_version);
-    manifest.noise = Some(recipe.declared(seed));
-    manifest.tables.clear();
-    let generator = &mut manifest.generator;
-    let before = format!("{} {}", generator.tool, generator.version);
-    let before_seed = generator.seed.map(|seed| seed.to_string());
-    // What was measured before is measured anew: then the generator before that one counts.
-    if generator.tool != TOOL {
-        let entries = [("from", Some(before)), ("from_seed", before_seed)];
-        let entries = entries.into_iter().filter_map(|(name, value)| Some((name.to_owned(), value?)));
-        generator.parameters.extend(entries.collect::<BTreeMap<_, _>>());
-    }
-    TOOL.clone_into(&mut generator.tool);
-    env!("CARGO_PKG_VERSION").clone_into(&mut generator.version);
-    generator.seed = Some(seed);
-    let made_anew = [PointMeasurement::TABLE.name, LineMeasurement::TABLE.name];
-    let made_of_them =
-        ["trajectories", "map_points", "graph_poses", "graph_points", "graph_lines", "graph_factors"];
-    manifest.recovered.retain(|entry| {
-        let table = entry.table.as_str();
-        !made_anew.contains(&table) && (keep_estimates || !made_of_them.contains(&table))
-    });
-    manifest
-}
-
-/// The tool's name in a manifest.
-const TOOL: &str = "os measure";
-
 /// Begins every output with the tables of the whole sequence, which are read once for all.
 fn begin(
     args: &Args,
@@ -360,7 +291,7 @@ fn begin(
     let groups: Vec<StructuralGroup> = reader.table()?;
     let mut realisations = Vec::new();
     for (seed, path) in outputs {
-        let manifest = manifest(reader.manifest(), recipe, *seed, args.keep_estimates);
+        let manifest = stations::measured_manifest(reader.manifest(), recipe, *seed, args.keep_estimates);
         let options = WriteOptions { force: args.force, ..WriteOptions::default() };
         let writer = SequenceWriter::create(path, &manifest, frames, options)?;
         realisations.push(Realisation::new(writer, &manifest, &groups));

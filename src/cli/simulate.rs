@@ -1,16 +1,16 @@
 //! `os simulate`: a sequence out of a recipe.
 
-use std::io::{self, Read, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 
 use super::progress::{Progress, Stages};
 use super::{Outcome, render, text};
-use crate::datasets;
 use crate::format::{Encoding, Outline, WriteOptions, Written, write_two_pass};
-use crate::simulate::{self, Expected, MAX_RECIPE_BYTES, Recipe, Simulation};
-use crate::storage::{self, File};
+use crate::simulate::{self, Expected, Simulation};
+use crate::stations;
+use crate::storage;
 
 /// Simulate a sequence: a scene, a path through it, what each frame sees, and noise.
 ///
@@ -63,7 +63,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     }
     refuse_existing(output, args.force)?;
     let raw = args.render.target(args.force)?;
-    let (mut recipe, folder) = recipe_of(name)?;
+    let (mut recipe, folder) = stations::simulation_recipe(name)?;
     // What is expected, is expected of the recipe as it stands.
     let expected = recipe.expected.take().filter(|_| args.seed.is_none_or(|seed| seed == recipe.seed));
     recipe.seed = args.seed.unwrap_or(recipe.seed);
@@ -145,35 +145,6 @@ fn refuse_existing(output: &Path, force: bool) -> anyhow::Result<()> {
         anyhow::bail!("{} exists; --force replaces it", output.display());
     }
     Ok(())
-}
-
-/// A recipe, and the folder in which names of files in it start.
-fn recipe_of(name: &str) -> anyhow::Result<(Recipe, PathBuf)> {
-    let path = Path::new(name);
-    if storage::is_folder(path) || (!storage::exists(path) && path.extension().is_none()) {
-        if datasets::names().contains(&name) {
-            anyhow::bail!(
-                "{name} is not simulated, it comes from images: `os fetch {name}` gets them and says how to convert them"
-            );
-        }
-        // A name of ours goes before a folder of that name, such as an output that stands beside.
-        return Ok((simulate::named(name)?, PathBuf::new()));
-    }
-    let mut text = String::new();
-    let file = File::open(path).with_context(|| name.to_owned())?;
-    let bytes = file.take(MAX_RECIPE_BYTES + 1).read_to_string(&mut text).with_context(|| name.to_owned())?;
-    if bytes as u64 > MAX_RECIPE_BYTES {
-        anyhow::bail!("{name}: expected a recipe of at most {MAX_RECIPE_BYTES} bytes");
-    }
-    let recipe = if path.extension().is_some_and(|extension| extension == "json") {
-        let recipe: Recipe = serde_json::from_str(&text).with_context(|| name.to_owned())?;
-        recipe.check().with_context(|| name.to_owned())?;
-        recipe
-    } else {
-        Recipe::from_toml(&text).with_context(|| name.to_owned())?
-    };
-    let folder = path.parent().map(Path::to_owned).unwrap_or_default();
-    Ok((recipe, folder))
 }
 
 fn list(stdout: &mut dyn Write) -> anyhow::Result<Outcome> {

@@ -2,19 +2,15 @@
 
 use std::io::{self, Write};
 use std::path::PathBuf;
-use std::time::Instant;
 
 use anyhow::Context;
 use clap::ValueEnum;
-use serde_json::json;
 
 use super::progress::Progress;
 use super::{Outcome, extended, text};
 use crate::geometry::Pose;
-use crate::structure::{
-    DepthNoise, Estimate, Frame, MeasuredFrame, MeasurementNoise, Sequence, TrackedFrame, registry,
-};
-use crate::track::{self, Method, Sensor, TrackOptions};
+use crate::stations::{self, TrackRequest};
+use crate::track::{Method, Sensor};
 
 /// What a frame is aligned to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -99,120 +95,68 @@ fn pose(text: &str) -> Result<Pose, String> {
 }
 
 impl Args {
-    fn default_name(&self) -> String {
-        let method = match self.method {
-            MethodName::FrameToFrame => registry::FRAME_TO_FRAME,
-            MethodName::MapToFrame => registry::MAP_TO_FRAME,
-        };
-        if self.classic { format!("{method}-classic") } else { method.to_owned() }
-    }
-
-    fn options(&self, sensor: SensorName) -> anyhow::Result<TrackOptions> {
-        if self.baseline.is_some() && !matches!(sensor, SensorName::Stereo) {
+    fn request(&self) -> anyhow::Result<TrackRequest> {
+        if self.baseline.is_some() && self.sensor != Some(SensorName::Stereo) {
             anyhow::bail!("--baseline goes with --sensor stereo");
         }
-        let sensor = match sensor {
-            SensorName::Monocular => Sensor::Monocular,
-            SensorName::Rgbd => Sensor::Rgbd,
-            SensorName::Stereo => {
-                Sensor::Stereo { baseline_m: self.baseline.context("--sensor stereo takes a --baseline")? }
+        let sensor = match self.sensor {
+            Some(SensorName::Monocular) => Some(Sensor::Monocular),
+            Some(SensorName::Rgbd) => Some(Sensor::Rgbd),
+            Some(SensorName::Stereo) => {
+                let baseline_m = self.baseline.context("--sensor stereo takes a --baseline")?;
+                Some(Sensor::Stereo { baseline_m })
             }
+            None => None,
         };
         let method = match self.method {
             MethodName::FrameToFrame => Method::FrameToFrame,
             MethodName::MapToFrame => Method::MapToFrame,
         };
-        Ok(TrackOptions { method, classic: self.classic, sensor, seed: self.seed })
+        Ok(TrackRequest {
+            method,
+            classic: self.classic,
+            sensor,
+            first_pose: self.first_pose,
+            seed: self.seed,
+            name: self.name.clone(),
+            replace: self.replace,
+        })
     }
 }
 
 pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome> {
-    let (mut sequence, mut outcome) = extended::read(&args.sequence, &args.output, args.force)?;
-    let name = args.name.clone().unwrap_or_else(|| args.default_name());
-    extended::check_name("an estimate", &name, Estimate::is_in(&sequence, &name), args.replace)?;
-    extended::check_cameras(&sequence)?;
-    let frames = MeasuredFrame::of(&sequence);
-    let measured = frames.iter().any(|frame| !frame.points.is_empty() || !frame.lines.is_empty());
-    anyhow::ensure!(measured, "the sequence has no measurements; `os measure` makes them of observations");
-    let noise = MeasurementNoise::declared(&sequence.manifest);
-    let sensor = args.sensor.unwrap_or(if noise.depth != DepthNoise::Unknown && has_depth(&sequence) {
-        SensorName::Rgbd
-    } else {
-        SensorName::Monocular
-    });
-    let first = match args.first_pose {
-        Some(pose) => pose,
-        None => true_first_pose(&sequence, &frames)?,
-    };
-    let mut tracker = args.options(sensor)?.tracker(&sequence.manifest.cameras, noise, first)?;
+    let request = args.request()?;
+    let (sequence, mut outcome) = extended::read(&args.sequence, &args.output, args.force)?;
     let progress = Progress::new("tracking", "frames");
-    let begun = Instant::now();
-    let estimate =
-        track::track(&frames, &name, tracker.as_mut(), &|done, total| progress.update(done, total))?;
-    let seconds = begun.elapsed().as_secs_f64();
+    let (sequence, found) = stations::track(sequence, &request, &|done, total| progress.update(done, total))?;
     drop(progress);
-    let count = |state: &str| estimate.tracking.iter().filter(|row| row.state == state).count();
-    let (tracked, predicted, lost) =
-        (count(registry::TRACKED), count(registry::PREDICTED), count(registry::LOST));
-    if predicted + lost > 0 {
+    if found.predicted + found.lost > 0 {
         outcome = Outcome::Findings;
     }
-    let rms = median_rms(&estimate.tracking);
-    let (points, lines) = (estimate.points.len(), estimate.lines.len());
-    let sensor_name = match sensor {
-        SensorName::Monocular => "monocular",
-        SensorName::Stereo => "stereo",
-        SensorName::Rgbd => "rgbd",
-    };
-    estimate.put(&mut sequence);
     let size = extended::write(&args.output, sequence, args.force)?;
     if args.json {
-        let said = json!({
-            "estimate": name, "sensor": sensor_name, "frames": frames.len(), "tracked": tracked,
-            "predicted": predicted, "lost": lost, "residual_rms_median": rms, "points": points, "lines": lines,
-            "seconds": seconds,
-        });
+        let said = serde_json::to_value(&found)?;
         writeln!(stdout, "{}", serde_json::to_string_pretty(&said)?)?;
         return Ok(outcome);
     }
     writeln!(
         stdout,
-        "estimate `{name}` ({sensor_name}): {} frames, {} tracked, {} predicted, {} lost; {} points, {} lines",
-        text::count(frames.len() as u64),
-        text::count(tracked as u64),
-        text::count(predicted as u64),
-        text::count(lost as u64),
-        text::count(points as u64),
-        text::count(lines as u64)
+        "estimate `{}` ({}): {} frames, {} tracked, {} predicted, {} lost; {} points, {} lines",
+        found.estimate,
+        found.sensor,
+        text::count(found.frames as u64),
+        text::count(found.tracked as u64),
+        text::count(found.predicted as u64),
+        text::count(found.lost as u64),
+        text::count(found.points as u64),
+        text::count(found.lines as u64)
     )?;
-    if let Some(rms) = rms {
+    if let Some(rms) = found.residual_rms_median {
         writeln!(stdout, "residuals of inliers: {rms:.2} sigma (median of the frames' RMS)")?;
     }
     // Results are the same every time; this is not.
-    writeln!(io::stderr(), "{seconds:.1} s, {:.0} frames/s", frames.len() as f64 / seconds.max(1e-9))?;
+    let (seconds, frames) = (found.seconds, found.frames as f64);
+    writeln!(io::stderr(), "{seconds:.1} s, {:.0} frames/s", frames / seconds.max(1e-9))?;
     writeln!(stdout, "{}: {size}", args.output.display())?;
     Ok(outcome)
-}
-
-/// Whether anything has a depth.
-fn has_depth(sequence: &Sequence) -> bool {
-    sequence.point_measurements.iter().any(|row| row.depth.is_some())
-        || sequence.line_measurements.iter().any(|row| row.start_depth.is_some() && row.end_depth.is_some())
-}
-
-/// The true pose of the first frame, which is the gauge; the identity where it is not known.
-fn true_first_pose(sequence: &Sequence, frames: &[MeasuredFrame]) -> anyhow::Result<Pose> {
-    let Some(first) = frames.first() else { return Ok(Pose::identity()) };
-    let truth = sequence.frames.iter().find(|frame| frame.frame_id == first.frame_id);
-    match truth.and_then(Frame::world_from_camera) {
-        Some(row) => row.pose().with_context(|| format!("frames: the true pose of {}", first.frame_id)),
-        None => Ok(Pose::identity()),
-    }
-}
-
-/// The median of the frames' root mean square residuals.
-fn median_rms(tracking: &[TrackedFrame]) -> Option<f64> {
-    let mut all: Vec<f64> = tracking.iter().filter_map(|row| row.residual_rms).collect();
-    all.sort_by(f64::total_cmp);
-    all.get(all.len() / 2).copied()
 }

@@ -43,7 +43,12 @@ pub(super) fn from_batch<R: Record>(
     R::take(&source, rows)
 }
 
-fn column(batch: &RecordBatch, table: &'static str, field: &'static Field) -> Result<ArrayRef, Error> {
+/// A column by its name, of the type that the specification says; one that may be absent is all null then.
+pub(super) fn column(
+    batch: &RecordBatch,
+    table: &'static str,
+    field: &'static Field,
+) -> Result<ArrayRef, Error> {
     let Some(array) = batch.column_by_name(field.name) else {
         if field.nullable {
             return Ok(arrow::array::new_null_array(&data_type(field.kind), batch.num_rows()));

@@ -13,6 +13,7 @@ mod arrow_message;
 mod arrow_schema;
 mod batches;
 mod collection;
+mod columns;
 mod copy;
 mod counted_file;
 mod croissant;
@@ -45,6 +46,7 @@ pub(crate) use collection::StoredCatalogue;
 pub use collection::{
     Collection, Member, catalogue_entry, folder_name, read_catalogue, sequence_name, write_catalogue,
 };
+pub use columns::{record_batch, record_batch_of};
 pub use copy::copy;
 pub use encoding::Encoding;
 pub use error::Error;
@@ -57,7 +59,7 @@ pub use partial::discard_unfinished;
 pub use reader::{SequenceReader, open, read};
 pub use record_batches::RecordBatches;
 pub use rerun::{RerunCounts, write_rerun};
-pub use results::{read_results, write_results, write_text};
+pub use results::{read_results, results_batch, write_results, write_text};
 pub use stored_table::StoredTable;
 pub use two_pass::{Chunk, Outline, Realisation, Tally, write_realisations, write_two_pass};
 pub use writer::{FrameRows, SequenceWriter, WriteOptions, Written, write};

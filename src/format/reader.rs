@@ -23,7 +23,7 @@ use crate::structure::{
 };
 
 /// Most rows that are held in memory at once; longer tables are read in batches.
-const MAX_ROWS_IN_MEMORY: u64 = 1 << 29;
+pub(super) const MAX_ROWS_IN_MEMORY: u64 = 1 << 29;
 /// Largest manifest that is read.
 const MAX_MANIFEST_BYTES: u64 = 1 << 28;
 

@@ -24,6 +24,32 @@ use crate::structure::{ResultTable, ResultValues};
 /// [`Error::Exists`] when something is there, [`Error::Io`], and [`Error::Container`] when the columns differ in length.
 pub fn write_results(path: &Path, table: &ResultTable, force: bool) -> Result<(), Error> {
     let container = |detail: String| Error::Container { path: path.to_owned(), container: "Parquet", detail };
+    let batch = as_batch(table).map_err(|cause| container(cause.to_string()))?;
+    let partial = Partial::file(path, force)?;
+    let mut bytes = Vec::new();
+    let properties = WriterProperties::builder()
+        .set_created_by(format!("open-structure {}", env!("CARGO_PKG_VERSION")))
+        .set_compression(Compression::ZSTD(ZstdLevel::default()))
+        .build();
+    let written =
+        ArrowWriter::try_new(&mut bytes, batch.schema(), Some(properties)).and_then(|mut writer| {
+            writer.write(&batch)?;
+            writer.close()
+        });
+    written.map_err(|cause| container(cause.to_string()))?;
+    partial.create_file()?.write_all(&bytes).map_err(Error::io(partial.path()))?;
+    partial.finish()
+}
+
+/// A table of results as one record batch; units and meanings are metadata of its columns.
+///
+/// # Errors
+/// [`Error::Container`] when the columns differ in length.
+pub fn results_batch(table: &ResultTable) -> Result<RecordBatch, Error> {
+    as_batch(table).map_err(|cause| Error::container(Path::new(&table.name), "Arrow")(cause.into()))
+}
+
+fn as_batch(table: &ResultTable) -> Result<RecordBatch, arrow::error::ArrowError> {
     let fields: Vec<Field> = table
         .columns
         .iter()
@@ -37,21 +63,7 @@ pub fn write_results(path: &Path, table: &ResultTable, force: bool) -> Result<()
     let name: HashMap<_, _> = [("name".to_owned(), table.name.clone())].into();
     let schema = Arc::new(Schema::new_with_metadata(fields, name));
     let arrays = table.columns.iter().map(|column| array(&column.values)).collect();
-    let batch =
-        RecordBatch::try_new(Arc::clone(&schema), arrays).map_err(|cause| container(cause.to_string()))?;
-    let partial = Partial::file(path, force)?;
-    let mut bytes = Vec::new();
-    let properties = WriterProperties::builder()
-        .set_created_by(format!("open-structure {}", env!("CARGO_PKG_VERSION")))
-        .set_compression(Compression::ZSTD(ZstdLevel::default()))
-        .build();
-    let written = ArrowWriter::try_new(&mut bytes, schema, Some(properties)).and_then(|mut writer| {
-        writer.write(&batch)?;
-        writer.close()
-    });
-    written.map_err(|cause| container(cause.to_string()))?;
-    partial.create_file()?.write_all(&bytes).map_err(Error::io(partial.path()))?;
-    partial.finish()
+    RecordBatch::try_new(schema, arrays)
 }
 
 /// Writes a text file as outputs are written: under a temporary name first.

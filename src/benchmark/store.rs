@@ -103,7 +103,7 @@ impl Store {
     /// [`Error::Io`].
     pub(super) fn finished(folder: &Path) -> Result<(Self, Plan, Vec<String>), Error> {
         let file = folder.join(PLAN_FILE);
-        let stored: StoredPlan = read(&file)?;
+        let stored: StoredPlan = expected(&file)?;
         let version = env!("CARGO_PKG_VERSION");
         if stored.version != version {
             let difference = format!("of version {}, this is {version}", stored.version);
@@ -121,7 +121,7 @@ impl Store {
     /// # Errors
     /// [`Error::Io`], [`Error::Stored`].
     pub(super) fn content(&self, sequence: &str) -> Result<Content, Error> {
-        read(&self.content_file(sequence))
+        expected(&self.content_file(sequence))
     }
 
     fn content_file(&self, sequence: &str) -> PathBuf {
@@ -235,6 +235,11 @@ fn file_name(name: &str) -> String {
     }
     let safe: String = name.chars().take(50).map(|c| if is_safe(c) { c } else { '_' }).collect();
     format!("{safe}.{hash:016x}")
+}
+
+/// What a file holds that has to be there.
+fn expected<T: DeserializeOwned>(path: &Path) -> Result<T, Error> {
+    read(path)?.ok_or_else(|| Error::io(path)(ErrorKind::NotFound.into()))
 }
 
 /// What a file holds; `None` where none is.

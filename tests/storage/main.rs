@@ -400,3 +400,30 @@ fn a_server_that_gives_no_parts_gives_the_whole() {
         assert!(said.contains("conformant; 40 445 rows"), "{said}");
     }
 }
+
+#[test]
+fn a_collection_is_one_wherever_it_lies() {
+    let folder = folder();
+    let at = folder.path();
+    fs::create_dir(at.join("many")).unwrap();
+    fs::rename(at.join("box1"), at.join("many/sequence=box1")).unwrap();
+    for store in Store::all() {
+        let url = store.url("many");
+        store.server.keep_folder("bucket/many", &at.join("many"));
+        if store.scheme == "http" {
+            // Nothing is listed there, so the catalogue has to be there first.
+            assert!(store.failed(at, &["stats", &url]).contains(&url));
+            store.done(at, &["index", "many"]);
+            let catalogue = fs::read(at.join("many/catalogue.parquet")).unwrap();
+            store.server.keep("bucket/many/catalogue.parquet", catalogue);
+        } else {
+            store.done(at, &["index", &url]);
+            assert!(store.server.objects().contains_key("bucket/many/catalogue.parquet"));
+            assert!(store.failed(at, &["index", &url]).contains("--force"));
+        }
+        let said = store.done(at, &["validate", &url]);
+        assert!(said.contains("conformant; 40 445 rows"), "{said}");
+        let statistics = |path: &str| store.done(at, &["stats", "--csv", path]);
+        assert_eq!(statistics(&url), statistics("many"));
+    }
+}

@@ -27,7 +27,12 @@ fn ended(folder: &Path, arguments: &[&str], code: i32) -> String {
 #[track_caller]
 fn printed(folder: &Path, arguments: &[&str]) -> String {
     let output = os(folder, arguments);
-    assert!(output.status.success(), "os {}: {}", arguments.join(" "), String::from_utf8_lossy(&output.stderr));
+    assert!(
+        output.status.success(),
+        "os {}: {}",
+        arguments.join(" "),
+        String::from_utf8_lossy(&output.stderr)
+    );
     String::from_utf8(output.stdout).unwrap()
 }
 
@@ -75,7 +80,8 @@ fn a_collection_is_indexed_validated_and_looked_at() {
     let words = ended(at, &["validate", "--deny", "warnings", "all"], 0);
     assert_eq!(words.matches(": conformant; ").count(), 4, "{words}");
     let table = printed(at, &["stats", "all"]);
-    let first: Vec<&str> = table.lines().skip(1).take(3).map(|line| line.split("  ").next().unwrap()).collect();
+    let first: Vec<&str> =
+        table.lines().skip(1).take(3).map(|line| line.split("  ").next().unwrap()).collect();
     assert_eq!(first, NAMES);
     assert_eq!(printed(at, &["info", "all", "--json"]).lines().count(), 3);
     assert_eq!(printed(at, &["cat", "all", "catalogue", "--limit", "2"]).lines().count(), 2);
@@ -104,7 +110,10 @@ fn a_catalogue_out_of_date_is_found_and_written_anew() {
     let words = ended(at, &["validate", "all"], 3);
     assert!(words.contains("catalogue-complete"), "{words}");
     ended(at, &["index", "all", "--force"], 0);
-    assert!(fs::read(at.join("all/catalogue.parquet")).unwrap() == before, "the same sequences, the same bytes");
+    assert!(
+        fs::read(at.join("all/catalogue.parquet")).unwrap() == before,
+        "the same sequences, the same bytes"
+    );
 }
 
 #[test]
@@ -171,7 +180,14 @@ fn runs_that_are_gathered_give_the_table_of_one_run() {
     // Shared out by sequence, and one sequence by seed; the later seed comes first.
     benchmark(&["all/sequence=a", "-o", "run-1", "--seeds", "1..1"]);
     benchmark(&["all/sequence=a", "-o", "run-2", "--seeds", "0..0"]);
-    benchmark(&["all/sequence=b%202", &format!("all/{}", folder_name("größe")), "-o", "run-3", "--seeds", "2"]);
+    benchmark(&[
+        "all/sequence=b%202",
+        &format!("all/{}", folder_name("größe")),
+        "-o",
+        "run-3",
+        "--seeds",
+        "2",
+    ]);
     let gather = ["benchmark", "--gather", "run-1", "run-2", "run-3", "-o", "gathered"];
     let shown = printed(at, &gather);
     for name in ["table.md"] {
@@ -186,7 +202,10 @@ fn runs_that_are_gathered_give_the_table_of_one_run() {
     // What was gathered is a run like any other: it goes on, and is gathered again.
     benchmark(&["all", "-o", "gathered", "--seeds", "2"]);
     printed(at, &["benchmark", "--gather", "gathered", "-o", "again"]);
-    assert!(fs::read(at.join("again/cells.parquet")).unwrap() == fs::read(at.join("gathered/cells.parquet")).unwrap());
+    assert!(
+        fs::read(at.join("again/cells.parquet")).unwrap()
+            == fs::read(at.join("gathered/cells.parquet")).unwrap()
+    );
 }
 
 #[test]

@@ -77,7 +77,11 @@ fn jobs() -> tempfile::TempDir {
         fs::write(folder.path().join(format!("{name}.toml")), text).unwrap();
         if name == "three" {
             let output = folder.path().join("all/sequence=three");
-            let made = Command::new(OS).current_dir(&folder).args(["simulate", "three.toml", "-o"]).arg(output).output();
+            let made = Command::new(OS)
+                .current_dir(&folder)
+                .args(["simulate", "three.toml", "-o"])
+                .arg(output)
+                .output();
             assert!(made.unwrap().status.success());
         } else {
             jobs.push_str(&format!("{name} os simulate {name}.toml -o {{output}}\n"));

@@ -41,6 +41,7 @@ Examples:
   os benchmark converted/* -o results --seeds 10 --label \"2026-11-22, commit 3120c7e\"
   os benchmark box1.mcap -o results --methods map-to-frame,structural-ba --estimates my-slam
   os benchmark --gather runs/* -o results   what runs on several machines found, as one table")]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of its own")]
 pub(super) struct Args {
     /// Sequences: MCAP files, Parquet folders, collections, recipes (`.toml`), or names of built-in recipes such as `box1`.
     #[arg(required = true)]

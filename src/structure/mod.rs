@@ -7,6 +7,7 @@ mod camera;
 mod catalogue;
 mod cells;
 mod column;
+mod column_view;
 mod correspondence;
 mod digest;
 mod estimate;
@@ -43,7 +44,8 @@ mod trajectory_file;
 pub use camera::{Camera, Distortion};
 pub use catalogue::CatalogueEntry;
 pub use cells::ImageCells;
-pub use column::{Bitmap, ColumnSink, ColumnSource, ColumnValue, Lists, Nullable, TextLists};
+pub use column::{ColumnSink, ColumnSource, ColumnValue};
+pub use column_view::{Bitmap, Lists, Nullable, TextLists};
 pub use correspondence::{
     LineCorrespondence, PointCorrespondence, line_correspondences, point_correspondences,
 };

@@ -40,6 +40,7 @@ pub trait Record:
     fn frame(&self) -> Option<super::FrameId>;
 
     /// The rows of this table in a sequence; none where it is not a table of sequences.
+    #[must_use]
     fn rows(sequence: &Sequence) -> &[Self] {
         let _ = sequence;
         &[]

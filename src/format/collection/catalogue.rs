@@ -15,7 +15,7 @@ use crate::structure::registry::SPEC_VERSION;
 use crate::structure::{CATALOGUE, CatalogueEntry, Record};
 
 /// Most sequences of a catalogue that is read.
-const MOST_SEQUENCES: u64 = 1 << 22;
+const MOST_SEQUENCES: u64 = 1 << 18;
 
 /// A catalogue that is open for reading, right or wrong.
 pub(crate) struct StoredCatalogue {

@@ -31,15 +31,12 @@ pub fn sequence_name(folder: &str) -> Option<String> {
     let mut rest = encoded.as_bytes();
     while let [first, others @ ..] = rest {
         let digit = |at: usize| others.get(at).and_then(|digit| char::from(*digit).to_digit(16));
-        match (first, digit(0), digit(1)) {
-            (b'%', Some(high), Some(low)) => {
-                bytes.push(u8::try_from(16 * high + low).ok()?);
-                rest = &others[2..];
-            }
-            _ => {
-                bytes.push(*first);
-                rest = others;
-            }
+        if let (b'%', Some(high), Some(low)) = (first, digit(0), digit(1)) {
+            bytes.push(u8::try_from(16 * high + low).ok()?);
+            rest = &others[2..];
+        } else {
+            bytes.push(*first);
+            rest = others;
         }
     }
     Some(String::from_utf8(bytes).unwrap_or_else(|_| encoded.to_owned()))

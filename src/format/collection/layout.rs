@@ -108,6 +108,7 @@ impl Collection {
     /// What the catalogue has to say of each sequence, in their order; one that cannot be read brings its error.
     ///
     /// * `tell` — told how many are done and how many there are, from any thread.
+    #[must_use]
     pub fn entries(&self, tell: Option<&(dyn Fn(u64, u64) + Sync)>) -> Vec<Result<CatalogueEntry, Error>> {
         let (done, total) = (AtomicU64::new(0), self.members.len() as u64);
         let entry = |member: &Member| {

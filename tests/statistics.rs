@@ -223,7 +223,10 @@ fn pictures_are_drawn_once_and_are_well_formed() {
         stdout(&os(&["plot", path, "-o", output, "--figure", figure, "--view", "top", "--force"]));
         let text = std::fs::read_to_string(output).unwrap();
         assert!(text.starts_with("<svg ") && text.ends_with("</svg>\n"), "{text}");
-        assert!(text.contains("a, &quot;b&quot;") != text.contains("a, \"b\""), "the name stands in the picture");
+        assert!(
+            text.contains("a, &quot;b&quot;") != text.contains("a, \"b\""),
+            "the name stands in the picture"
+        );
         // Every element is closed.
         assert_eq!(text.matches("<g ").count(), text.matches("</g>").count());
         assert_eq!(text.matches("<text ").count(), text.matches("</text>").count());

@@ -44,8 +44,14 @@ const MOST_THREADS: usize = 1024;
 /// * ``threads``: threads; by default one for each core.
 #[pyfunction]
 #[pyo3(signature = (sequence, *, method = "point-line", graph = None, name = None, points = None, lines = None, loss = None, optimiser = "lm", max_iterations = None, tolerance = None, min_views = None, fix = Vec::new(), sigma_px = None, soft = None, no_groups = false, no_motion = false, eliminate = None, factorise = None, covariance = false, replace = false, threads = None))]
-#[pyo3(text_signature = "(sequence, *, method='point-line', graph=None, name=None, points=None, lines=None, loss=None, optimiser='lm', max_iterations=None, tolerance=None, min_views=None, fix=(), sigma_px=None, soft=None, no_groups=False, no_motion=False, eliminate=None, factorise=None, covariance=False, replace=False, threads=None)")]
-#[expect(clippy::too_many_arguments, clippy::fn_params_excessive_bools, reason = "the options of a command, by name")]
+#[pyo3(
+    text_signature = "(sequence, *, method='point-line', graph=None, name=None, points=None, lines=None, loss=None, optimiser='lm', max_iterations=None, tolerance=None, min_views=None, fix=(), sigma_px=None, soft=None, no_groups=False, no_motion=False, eliminate=None, factorise=None, covariance=False, replace=False, threads=None)"
+)]
+#[expect(
+    clippy::too_many_arguments,
+    clippy::fn_params_excessive_bools,
+    reason = "the options of a command, by name"
+)]
 pub(crate) fn adjust(
     py: Python<'_>,
     sequence: Given<'_>,

@@ -22,7 +22,10 @@ impl<'py> FromPyObject<'_, 'py> for Given<'py> {
             return Ok(Self { sequence: sequence.to_owned() });
         }
         let path: PathBuf = object.extract().map_err(|_| {
-            let found = object.get_type().name().map_or_else(|_| "something else".to_owned(), |name| name.to_string());
+            let found = object
+                .get_type()
+                .name()
+                .map_or_else(|_| "something else".to_owned(), |name| name.to_string());
             pyo3::exceptions::PyTypeError::new_err(format!("expected a Sequence or a path, found {found}"))
         })?;
         let opened = object.py().get_type::<Sequence>().call_method1("open", (path,))?;
@@ -55,17 +58,29 @@ pub(crate) fn choice<T: Copy>(option: &str, found: &str, choices: &[(&str, T)]) 
 
 /// A whole number over zero.
 pub(crate) fn at_least_one(option: &str, found: usize) -> PyResult<usize> {
-    if found > 0 { Ok(found) } else { Err(errors::option(format!("{option}: expected a whole number over zero, found 0"))) }
+    if found > 0 {
+        Ok(found)
+    } else {
+        Err(errors::option(format!("{option}: expected a whole number over zero, found 0")))
+    }
 }
 
 /// A finite number over zero.
 pub(crate) fn positive(option: &str, found: f64) -> PyResult<f64> {
     let right = found > 0.0 && found.is_finite();
-    if right { Ok(found) } else { Err(errors::option(format!("{option}: expected a number over zero, found {found}"))) }
+    if right {
+        Ok(found)
+    } else {
+        Err(errors::option(format!("{option}: expected a number over zero, found {found}")))
+    }
 }
 
 /// A finite number that is not below zero.
 pub(crate) fn not_negative(option: &str, found: f64) -> PyResult<f64> {
     let right = found >= 0.0 && found.is_finite();
-    if right { Ok(found) } else { Err(errors::option(format!("{option}: expected a number not below zero, found {found}"))) }
+    if right {
+        Ok(found)
+    } else {
+        Err(errors::option(format!("{option}: expected a number not below zero, found {found}")))
+    }
 }

@@ -39,7 +39,10 @@ impl Kind {
         }
     }
 
-    fn with(self, arguments: impl for<'py> FnOnce(Python<'py>, Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>>) -> PyErr {
+    fn with(
+        self,
+        arguments: impl for<'py> FnOnce(Python<'py>, Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>>,
+    ) -> PyErr {
         Python::attach(|py| {
             let raised = py
                 .import("open_structure._errors")

@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use open_structure::stations;
-use open_structure::structure::{self, Estimate, FrameId, LineId, MapLine, MapPoint, PointId, TrajectoryPose};
+use open_structure::structure::{
+    self, Estimate, FrameId, LineId, MapLine, MapPoint, PointId, TrajectoryPose,
+};
 use pyo3::prelude::*;
 use serde_json::json;
 
@@ -25,7 +27,9 @@ struct Rows<const N: usize> {
 impl<const N: usize> Rows<N> {
     /// Has Python pack what the user gave: arrays, tables, mappings.
     fn of(py: Python<'_>, kind: &str, given: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
-        let Some(given) = given else { return Ok(Self { ids: Vec::new(), numbers: Vec::new(), covariances: None }) };
+        let Some(given) = given else {
+            return Ok(Self { ids: Vec::new(), numbers: Vec::new(), covariances: None });
+        };
         let packed = py.import("open_structure._estimate")?.call_method1("packed", (kind, given))?;
         let (ids, numbers, covariances): Packed = packed.extract()?;
         let ids: Vec<i64> = words(&ids).map(i64::from_ne_bytes).collect();
@@ -100,8 +104,7 @@ pub(crate) fn enter(
         "estimate": estimate.name, "poses": estimate.trajectory.len(), "points": estimate.points.len(),
         "lines": estimate.lines.len(),
     });
-    let made =
-        work::run(py, errors::of_station, |_| stations::enter(sequence.clone(), estimate, replace))?;
+    let made = work::run(py, errors::of_station, |_| stations::enter(sequence.clone(), estimate, replace))?;
     Ok(Sequence::made(made, summary))
 }
 

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use open_structure::evaluate::{
-    Alignment, AlignmentKind, Delta, EvaluateOptions, Evaluated, Relation, Step, per_frame_table, summary_table,
+    Alignment, AlignmentKind, Delta, EvaluateOptions, Evaluated, Relation, Step, per_frame_table,
+    summary_table,
 };
 use open_structure::format::results_batch;
 use open_structure::stations::{self, EvaluateRequest};
@@ -90,7 +91,11 @@ impl Asked<'_> {
         Ok(EvaluateRequest { estimates: Names::all(self.estimate), reference: self.reference, options })
     }
 
-    fn compare(self, py: Python<'_>, sequence: &Given<'_>) -> PyResult<(Vec<Evaluated>, std::sync::Arc<Rows>)> {
+    fn compare(
+        self,
+        py: Python<'_>,
+        sequence: &Given<'_>,
+    ) -> PyResult<(Vec<Evaluated>, std::sync::Arc<Rows>)> {
         let request = self.request()?;
         let (rows, title) = (sequence.rows()?, sequence.title());
         let found = work::run(py, errors::of_station, |_| stations::evaluate(&title, &rows, &request))?;
@@ -121,7 +126,8 @@ fn complain(py: Python<'_>, rows: &[Evaluated]) -> PyResult<()> {
         if found.absolute.is_err() && found.relative.is_err() {
             failed.push(error);
         }
-        py.import("warnings")?.call_method1("warn", (format!("{}, {}: {error}", row.sequence, found.name),))?;
+        py.import("warnings")?
+            .call_method1("warn", (format!("{}, {}: {error}", row.sequence, found.name),))?;
     }
     match failed.first() {
         Some(error) if failed.len() == rows.len() => Err(errors::of_evaluate(error)),
@@ -174,8 +180,16 @@ pub(crate) fn evaluate(
         relations = vec![Relation::Translation, Relation::AngleRad];
     }
     let reference = reference.to_owned();
-    let asked =
-        Asked { estimate, reference, align, align_first, rpe_delta, rpe_unit, all_pairs, pairs_from_reference };
+    let asked = Asked {
+        estimate,
+        reference,
+        align,
+        align_first,
+        rpe_delta,
+        rpe_unit,
+        all_pairs,
+        pairs_from_reference,
+    };
     let (found, _) = asked.compare(py, &sequence)?;
     table(&summary_table(&found, &relations))
 }
@@ -197,8 +211,16 @@ pub(crate) fn evaluate_frames(
     pairs_from_reference: bool,
 ) -> PyResult<Table> {
     let reference = reference.to_owned();
-    let asked =
-        Asked { estimate, reference, align, align_first, rpe_delta, rpe_unit, all_pairs, pairs_from_reference };
+    let asked = Asked {
+        estimate,
+        reference,
+        align,
+        align_first,
+        rpe_delta,
+        rpe_unit,
+        all_pairs,
+        pairs_from_reference,
+    };
     let (found, rows) = asked.compare(py, &sequence)?;
     let stamps: BTreeMap<FrameId, i64> =
         rows.frames.iter().map(|frame| (frame.frame_id, frame.stamp_nanos)).collect();

@@ -51,7 +51,8 @@ impl Frame {
     #[getter]
     fn world_from_camera<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         let Some(row) = self.bundle.frame.world_from_camera() else { return Ok(None) };
-        let pose = row.pose().map_err(|cause| errors::step(format!("{}: {cause}", self.bundle.frame.frame_id)))?;
+        let pose =
+            row.pose().map_err(|cause| errors::step(format!("{}: {cause}", self.bundle.frame.frame_id)))?;
         let numbers = arrow::array::Float64Array::from(matrix(&pose).to_vec());
         Column::as_numpy(py, Arc::new(numbers))?.call_method1("reshape", (4, 4)).map(Some)
     }

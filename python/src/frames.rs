@@ -37,9 +37,12 @@ impl Frames {
 
     /// The frame at a place; counted from the end where it is negative.
     fn __getitem__(&self, py: Python<'_>, place: isize) -> PyResult<Frame> {
-        let index = if place < 0 { self.ids.len().checked_add_signed(place) } else { usize::try_from(place).ok() };
+        let index =
+            if place < 0 { self.ids.len().checked_add_signed(place) } else { usize::try_from(place).ok() };
         let id = index.and_then(|index| self.ids.get(index));
-        let id = id.ok_or_else(|| PyIndexError::new_err(format!("{} frames, no frame at {place}", self.ids.len())))?;
+        let id = id.ok_or_else(|| {
+            PyIndexError::new_err(format!("{} frames, no frame at {place}", self.ids.len()))
+        })?;
         self.sequence.get().frame(py, id.0)
     }
 

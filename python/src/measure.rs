@@ -29,7 +29,11 @@ use crate::work;
 /// * ``complete_depths``: keep the measurements that are there, and give those without depth one, drawn about the true depth.
 #[pyfunction]
 #[pyo3(signature = (sequence, noise, *, seed = 0, set = None, outliers = None, missed = None, quantise = None, drop_outside = false, keep_depth = false, keep_estimates = false, complete_depths = false))]
-#[expect(clippy::too_many_arguments, clippy::fn_params_excessive_bools, reason = "the options of a command, by name")]
+#[expect(
+    clippy::too_many_arguments,
+    clippy::fn_params_excessive_bools,
+    reason = "the options of a command, by name"
+)]
 pub(crate) fn measure(
     py: Python<'_>,
     sequence: Given<'_>,

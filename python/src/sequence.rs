@@ -161,7 +161,9 @@ impl Sequence {
         match &self.source {
             Source::File(reader) => reader.tables().iter().map(|stored| stored.table.name).collect(),
             Source::Memory(sequence) => {
-                let count = |table: &'static structure::TableInfo| format::record_batch_of(sequence, table).map_or(0, |rows| rows.num_rows());
+                let count = |table: &'static structure::TableInfo| {
+                    format::record_batch_of(sequence, table).map_or(0, |rows| rows.num_rows())
+                };
                 let there = |table: &'static structure::TableInfo| table.name == "frames" || count(table) > 0;
                 TABLES.iter().filter(|table| there(table)).map(|table| table.name).collect()
             }
@@ -243,11 +245,7 @@ impl Sequence {
     ///
     /// * ``name``: an estimate, or ``truth``; frames without a true pose are left out then.
     #[pyo3(signature = (name = "truth"))]
-    fn poses<'py>(
-        &self,
-        py: Python<'py>,
-        name: &str,
-    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+    fn poses<'py>(&self, py: Python<'py>, name: &str) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let rows: Vec<(FrameId, PoseRow)> = if name == "truth" {
             let frames = self.frame_list(py)?;
             frames.iter().filter_map(|frame| Some((frame.frame_id, frame.world_from_camera()?))).collect()

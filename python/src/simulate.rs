@@ -29,12 +29,16 @@ pub(crate) fn recipes() -> Vec<&'static str> {
 pub(crate) fn simulate(py: Python<'_>, recipe: &Bound<'_, PyAny>, seed: Option<u64>) -> PyResult<Sequence> {
     let (mut recipe, folder) = if let Ok(recipe) = recipe.cast::<PyDict>() {
         let text: String = py.import("json")?.call_method1("dumps", (recipe,))?.extract()?;
-        let recipe: Recipe = serde_json::from_str(&text).map_err(|cause| errors::option(format!("recipe: {cause}")))?;
+        let recipe: Recipe =
+            serde_json::from_str(&text).map_err(|cause| errors::option(format!("recipe: {cause}")))?;
         (recipe, PathBuf::new())
     } else {
         let name: PathBuf = recipe.extract()?;
         let Some(name) = name.to_str() else {
-            return Err(errors::option(format!("recipe: expected a name in UTF-8, found {}", name.display())));
+            return Err(errors::option(format!(
+                "recipe: expected a name in UTF-8, found {}",
+                name.display()
+            )));
         };
         stations::simulation_recipe(name).map_err(errors::of_station)?
     };

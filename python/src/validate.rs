@@ -25,13 +25,18 @@ pub(crate) fn validate(py: Python<'_>, path: PathBuf, max_findings: usize) -> Py
 }
 
 /// A sequence where it lies, or in memory.
-pub(crate) fn of_source<'py>(py: Python<'py>, source: &Source, max_findings: usize) -> PyResult<Bound<'py, PyAny>> {
+pub(crate) fn of_source<'py>(
+    py: Python<'py>,
+    source: &Source,
+    max_findings: usize,
+) -> PyResult<Bound<'py, PyAny>> {
     match source {
         Source::File(reader) => validate(py, reader.path().to_owned(), max_findings),
         Source::Memory(sequence) => {
             let report = work::run(py, errors::of_validate, |watch| {
                 let progress = |_, _| watch.progress();
-                let options = Options { listed: max_findings, progress: Some(&progress), ..Options::default() };
+                let options =
+                    Options { listed: max_findings, progress: Some(&progress), ..Options::default() };
                 Ok(validate_sequence(sequence, &options))
             })?;
             as_python(py, &report)

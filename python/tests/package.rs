@@ -18,7 +18,11 @@ fn project() -> &'static Path {
 fn python() -> Result<PathBuf, String> {
     let path = env::var_os("OPEN_STRUCTURE_PYTHON")
         .map_or_else(|| project().join("../.venv/bin/python"), PathBuf::from);
-    if path.exists() { Ok(path) } else { Err(format!("no Python at {}; `make setup` makes it", path.display())) }
+    if path.exists() {
+        Ok(path)
+    } else {
+        Err(format!("no Python at {}; `make setup` makes it", path.display()))
+    }
 }
 
 /// Where Cargo puts programs, from where it puts tests.
@@ -29,7 +33,11 @@ fn programs() -> PathBuf {
 /// The program `os`, which `cargo test --workspace` builds.
 fn os() -> Result<PathBuf, String> {
     let path = programs().join(format!("os{}", env::consts::EXE_SUFFIX));
-    if path.exists() { Ok(path) } else { Err("os is not built; `cargo test --workspace` builds it".to_owned()) }
+    if path.exists() {
+        Ok(path)
+    } else {
+        Err("os is not built; `cargo test --workspace` builds it".to_owned())
+    }
 }
 
 /// The package as a wheel has it: the sources beside the native half, which Cargo built for this test.

@@ -11,8 +11,8 @@ use super::foreign::{self, Foreign};
 use super::progress::Progress;
 use super::{Outcome, adjust_foreign, extended, parsed};
 use crate::adjust::{
-    Eliminate, Error, Factorisation, LineKind, Loss, Method, Optimiser, Options, Parallelism,
-    PointForm, SolverOptions, Step, Summary,
+    Eliminate, Error, Factorisation, LineKind, Loss, Method, Optimiser, Options, Parallelism, PointForm,
+    SolverOptions, Step, Summary,
 };
 use crate::format;
 use crate::stations::{self, AdjustRequest};
@@ -281,7 +281,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         replace: args.replace,
         threads: args.threads,
     };
-    let progress = args.progress();
+    let progress = Progress::new("adjusting", "steps");
     let found = stations::adjust(sequence, &request, &mut args.watch(&progress))?;
     drop(progress);
     outcome = args.outcome(&found.summary, outcome)?;
@@ -296,7 +296,7 @@ impl Args {
         &self,
         adjust: impl FnOnce(&mut dyn FnMut(&Step) -> bool) -> Result<T, Error> + Send,
     ) -> anyhow::Result<(T, Duration)> {
-        let progress = self.progress();
+        let progress = Progress::new("adjusting", "steps");
         let mut watch = self.watch(&progress);
         let run = || adjust(&mut watch);
         let start = Instant::now();
@@ -305,10 +305,6 @@ impl Args {
             None => run(),
         };
         Ok((adjusted?, start.elapsed()))
-    }
-
-    fn progress(&self) -> Progress {
-        Progress::new("adjusting", "steps")
     }
 
     /// Shows each step on a progress bar.

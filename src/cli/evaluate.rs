@@ -235,8 +235,8 @@ fn sequence(args: &Args, path: &Path, options: &EvaluateOptions) -> anyhow::Resu
         reference: args.reference.clone(),
         options: *options,
     };
-    let rows = stations::evaluate(&name_of(path), &read, &request)
-        .with_context(|| path.display().to_string())?;
+    let rows =
+        stations::evaluate(&name_of(path), &read, &request).with_context(|| path.display().to_string())?;
     let frames = &read.frames;
     let upward = plot::upward(&reader.manifest().cameras, frames);
     Ok(Compared {

@@ -221,13 +221,10 @@ fn complete_depths(
         tell_dropped(&format::open(&args.sequence)?)?;
     }
     for (seed, path) in outputs {
-        let request = MeasureRequest {
-            recipe: recipe.clone(),
-            seed: *seed,
-            keep_estimates: args.keep_estimates,
-        };
-        let (sequence, done) =
-            stations::complete_depths(&input, &request).with_context(|| args.sequence.display().to_string())?;
+        let request =
+            MeasureRequest { recipe: recipe.clone(), seed: *seed, keep_estimates: args.keep_estimates };
+        let (sequence, done) = stations::complete_depths(&input, &request)
+            .with_context(|| args.sequence.display().to_string())?;
         format::write(path, &sequence, WriteOptions { force: args.force, ..WriteOptions::default() })?;
         writeln!(
             stdout,

@@ -264,15 +264,11 @@ pub(super) fn measurements(wanted: &Wanted<'_>) -> anyhow::Result<PaperFigure> {
         let rank_of = group_ranks(&reader.table::<StructuralGroup>()?);
         for frame_id in chosen_frames(wanted, path, &reader)? {
             let frame = reader.frame(frame_id)?;
-            let frame = frame
-                .with_context(|| format!("{}: expected {frame_id}, found none", path.display()))?;
+            let frame =
+                frame.with_context(|| format!("{}: expected {frame_id}, found none", path.display()))?;
             let camera = reader.manifest().camera(frame.frame.camera_id);
             let camera = camera.with_context(|| {
-                format!(
-                    "{}, {frame_id}: {} is not in the manifest",
-                    path.display(),
-                    frame.frame.camera_id
-                )
+                format!("{}, {frame_id}: {} is not in the manifest", path.display(), frame.frame.camera_id)
             })?;
             let of_input =
                 if wanted.inputs.len() > 1 { format!("{}, ", plot::caption(path)) } else { String::new() };

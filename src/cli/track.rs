@@ -128,8 +128,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     let request = args.request()?;
     let (sequence, mut outcome) = extended::read(&args.sequence, &args.output, args.force)?;
     let progress = Progress::new("tracking", "frames");
-    let (sequence, found) =
-        stations::track(sequence, &request, &|done, total| progress.update(done, total))?;
+    let (sequence, found) = stations::track(sequence, &request, &|done, total| progress.update(done, total))?;
     drop(progress);
     if found.predicted + found.lost > 0 {
         outcome = Outcome::Findings;

@@ -45,7 +45,8 @@ impl SequenceReader {
             check_rows(self.path(), R::TABLE, rows, MAX_ROWS_IN_MEMORY)?;
             batches.push(batch);
         }
-        concat_batches(&schema, &batches).map_err(|cause| Error::container(self.path(), "Arrow")(cause.into()))
+        concat_batches(&schema, &batches)
+            .map_err(|cause| Error::container(self.path(), "Arrow")(cause.into()))
     }
 }
 
@@ -100,7 +101,8 @@ fn whole(
     field: &'static Field,
     first_row: u64,
 ) -> Result<ArrayRef, Error> {
-    let null = |row: usize| Error::Null { table: table.name, row: first_row + row as u64, column: field.name };
+    let null =
+        |row: usize| Error::Null { table: table.name, row: first_row + row as u64, column: field.name };
     if let Some(row) = (!field.nullable).then(|| first_null(&array)).flatten() {
         return Err(null(row));
     }

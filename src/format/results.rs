@@ -30,10 +30,11 @@ pub fn write_results(path: &Path, table: &ResultTable, force: bool) -> Result<()
         .set_created_by(format!("open-structure {}", env!("CARGO_PKG_VERSION")))
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
         .build();
-    let written = ArrowWriter::try_new(&mut bytes, batch.schema(), Some(properties)).and_then(|mut writer| {
-        writer.write(&batch)?;
-        writer.close()
-    });
+    let written =
+        ArrowWriter::try_new(&mut bytes, batch.schema(), Some(properties)).and_then(|mut writer| {
+            writer.write(&batch)?;
+            writer.close()
+        });
     written.map_err(|cause| container(cause.to_string()))?;
     partial.create_file()?.write_all(&bytes).map_err(Error::io(partial.path()))?;
     partial.finish()

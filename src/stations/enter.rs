@@ -20,7 +20,10 @@ pub fn enter(mut sequence: Sequence, estimate: Estimate, replace: bool) -> Resul
     let taken = Estimate::is_in(&sequence, &estimate.name);
     check_name("an estimate", &estimate.name, taken, replace)?;
     if estimate.trajectory.is_empty() && estimate.points.is_empty() && estimate.lines.is_empty() {
-        return Err(Error::Missing { missing: "use for an estimate without poses, points and lines", remedy: "" });
+        return Err(Error::Missing {
+            missing: "use for an estimate without poses, points and lines",
+            remedy: "",
+        });
     }
     let frames: HashSet<FrameId> = sequence.frames.iter().map(|frame| frame.frame_id).collect();
     let mut seen = HashSet::new();
@@ -36,8 +39,8 @@ pub fn enter(mut sequence: Sequence, estimate: Estimate, replace: bool) -> Resul
         let stored = pose.world_from_camera();
         finite(table, row, &stored.numbers())?;
         let length = stored.rotation_xyzw.iter().map(|part| part * part).sum::<f64>().sqrt();
-        // Written so that an overflow is refused.
-        if !((length - 1.0).abs() <= QUATERNION_TOLERANCE) {
+        // An overflow is further off than anything.
+        if (length - 1.0).abs() > QUATERNION_TOLERANCE {
             let expected = "a quaternion of length 1 within 1e-3";
             return Err(Error::Row { table, row, expected, found: format!("length {length:.6}") });
         }
@@ -58,7 +61,12 @@ pub fn enter(mut sequence: Sequence, estimate: Estimate, replace: bool) -> Resul
         finite(table, row, &[start.x, start.y, start.z, end.x, end.y, end.z])?;
         if start == end {
             let expected = "two ends that lie apart";
-            return Err(Error::Row { table, row, expected, found: format!("twice {:?}", start.coords.as_slice()) });
+            return Err(Error::Row {
+                table,
+                row,
+                expected,
+                found: format!("twice {:?}", start.coords.as_slice()),
+            });
         }
         if !seen.insert(line.line_id) {
             return Err(Error::Twice { table, row, id: line.line_id.to_string() });
@@ -95,9 +103,11 @@ mod tests {
     #[test]
     fn rows_get_the_name_and_their_order() {
         let sequence = entered(vec![pose(2, 1.0), pose(0, -1.0)], Vec::new()).unwrap();
-        let found: Vec<_> = sequence.trajectories.iter().map(|row| (row.estimate.as_str(), row.frame_id)).collect();
+        let found: Vec<_> =
+            sequence.trajectories.iter().map(|row| (row.estimate.as_str(), row.frame_id)).collect();
         assert_eq!(found, [("mine", FrameId(0)), ("mine", FrameId(2))]);
-        let again = Estimate { name: "mine".to_owned(), trajectory: vec![pose(1, 1.0)], ..Estimate::default() };
+        let again =
+            Estimate { name: "mine".to_owned(), trajectory: vec![pose(1, 1.0)], ..Estimate::default() };
         assert!(enter(sequence.clone(), again.clone(), false).is_err());
         assert_eq!(enter(sequence, again, true).unwrap().trajectories.len(), 1);
     }
@@ -106,7 +116,11 @@ mod tests {
     fn rows_that_no_estimate_can_have_are_refused() {
         let point = |x: f64| MapPoint { point_id: PointId(4), x, ..MapPoint::default() };
         for (trajectory, points, expected) in [
-            (vec![pose(7, 1.0)], vec![], "trajectories row 0: expected a frame of the sequence, found frame 7"),
+            (
+                vec![pose(7, 1.0)],
+                vec![],
+                "trajectories row 0: expected a frame of the sequence, found frame 7",
+            ),
             (vec![pose(1, 1.0), pose(1, 1.0)], vec![], "trajectories row 1: frame 1 stands there twice"),
             (vec![pose(1, 0.9)], vec![], "length 0.900000"),
             (vec![pose(1, f64::NAN)], vec![], "expected finite numbers, found NaN"),

@@ -54,9 +54,7 @@ pub enum Error {
         remedy: &'static str,
     },
     /// Nothing of the reference has a true pose.
-    #[error(
-        "expected frames with true poses, found none; an estimate can be the reference too ({there})"
-    )]
+    #[error("expected frames with true poses, found none; an estimate can be the reference too ({there})")]
     NoTruth {
         /// Estimates that there are.
         there: String,

@@ -55,8 +55,8 @@ pub fn evaluate(
     };
     let reference = if request.reference == Reconstruction::TRUTH {
         let (points, lines) = (&sequence.point_landmarks, &sequence.line_landmarks);
-        let truth = Reconstruction::truth(&sequence.frames, points, lines)
-            .map_err(wrong(Reconstruction::TRUTH))?;
+        let truth =
+            Reconstruction::truth(&sequence.frames, points, lines).map_err(wrong(Reconstruction::TRUTH))?;
         if truth.poses().is_empty() {
             return Err(Error::NoTruth { there: there() });
         }
@@ -70,11 +70,7 @@ pub fn evaluate(
         request.estimates.iter().map(String::as_str).collect()
     };
     if wanted.is_empty() {
-        return Err(Error::Unknown {
-            kind: "an estimate",
-            name: "to compare".to_owned(),
-            there: there(),
-        });
+        return Err(Error::Unknown { kind: "an estimate", name: "to compare".to_owned(), there: there() });
     }
     let compared = |name: &str| {
         let evaluation = evaluate::evaluate(&reference, &named(name)?, &request.options);

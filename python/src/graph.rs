@@ -25,11 +25,7 @@ use crate::work;
 /// * ``replace``: replace a graph of the same name.
 #[pyfunction]
 #[pyo3(signature = (sequence, *, estimate = None, kind = "reprojection", name = None, min_views = 2, key_frames = false, most_shared = None, longest_gap = None, loop_gap = None, loop_shared = None, no_loops = false, seed = 0, replace = false))]
-#[expect(
-    clippy::too_many_arguments,
-    clippy::fn_params_excessive_bools,
-    reason = "the options of a command, by name"
-)]
+#[expect(clippy::too_many_arguments, reason = "the options of a command, by name")]
 pub(crate) fn graph(
     py: Python<'_>,
     sequence: Given<'_>,

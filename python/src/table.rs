@@ -18,7 +18,7 @@ use crate::errors;
 
 /// One table of a sequence.
 ///
-/// Speaks the Arrow PyCapsule interface, so that every library that takes Arrow takes it as it is and without a copy:
+/// Speaks the Arrow ``PyCapsule`` interface, so that every library that takes Arrow takes it as it is and without a copy:
 /// ``pyarrow.table(table)``, ``polars.DataFrame(table)``, ``duckdb.sql("select * from table")``. ``table["u"]`` is one
 /// column as an array of numpy.
 ///

@@ -282,7 +282,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         replace: args.replace,
         threads: args.threads,
     };
-    let progress = args.progress();
+    let progress = Progress::new("adjusting", "steps");
     let found = stations::adjust(sequence, &request, &mut args.watch(&progress))?;
     drop(progress);
     outcome = args.outcome(&found.summary, outcome)?;
@@ -297,7 +297,7 @@ impl Args {
         &self,
         adjust: impl FnOnce(&mut dyn FnMut(&Step) -> bool) -> Result<T, Error> + Send,
     ) -> anyhow::Result<(T, Duration)> {
-        let progress = self.progress();
+        let progress = Progress::new("adjusting", "steps");
         let mut watch = self.watch(&progress);
         let run = || adjust(&mut watch);
         let start = Instant::now();
@@ -306,10 +306,6 @@ impl Args {
             None => run(),
         };
         Ok((adjusted?, start.elapsed()))
-    }
-
-    fn progress(&self) -> Progress {
-        Progress::new("adjusting", "steps")
     }
 
     /// Shows each step on a progress bar.

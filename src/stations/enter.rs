@@ -39,8 +39,8 @@ pub fn enter(mut sequence: Sequence, estimate: Estimate, replace: bool) -> Resul
         let stored = pose.world_from_camera();
         finite(table, row, &stored.numbers())?;
         let length = stored.rotation_xyzw.iter().map(|part| part * part).sum::<f64>().sqrt();
-        // Written so that an overflow is refused.
-        if !((length - 1.0).abs() <= QUATERNION_TOLERANCE) {
+        // An overflow is further off than anything.
+        if (length - 1.0).abs() > QUATERNION_TOLERANCE {
             let expected = "a quaternion of length 1 within 1e-3";
             return Err(Error::Row { table, row, expected, found: format!("length {length:.6}") });
         }

@@ -13,7 +13,7 @@ use crate::structure::CatalogueEntry;
 
 /// Write the catalogue of a collection: a row for each of its sequences.
 ///
-/// A collection is a folder of Parquet sequences that are called `sequence=NAME`, so that DuckDB, polars, Spark and Dask query
+/// A collection is a folder of Parquet sequences that are called `sequence=NAME`, so that duckdb, polars, Spark and Dask query
 /// all of them at once. The catalogue, `catalogue.parquet`, says what is in each: origin, frames, landmarks, measurements, the
 /// path, estimates. Commands that take several sequences take a collection for all of its own.
 ///

@@ -51,7 +51,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     let denied = if args.deny.is_some() { Severity::Warning } else { Severity::Error };
     let mut outcome = Outcome::Done;
     let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
-    for path in &expanded(&args.sequences)? {
+    for path in &expanded(&args.sequences) {
         let progress = Progress::new(path.display().to_string(), "rows");
         let update = |done, total| progress.update(done, total);
         let options = Options { listed: args.max_findings, progress: Some(&update), ..Options::default() };
@@ -72,7 +72,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
 }
 
 /// Each path, and after a collection its sequences.
-fn expanded(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
+fn expanded(paths: &[PathBuf]) -> Vec<PathBuf> {
     let mut all = Vec::new();
     for path in paths {
         all.push(path.clone());
@@ -81,7 +81,7 @@ fn expanded(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
             all.extend(collection.members.into_iter().map(|member| member.path));
         }
     }
-    Ok(all)
+    all
 }
 
 fn print(report: &Report, colour: bool, out: &mut dyn Write) -> anyhow::Result<()> {

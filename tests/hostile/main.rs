@@ -301,7 +301,7 @@ fn bits_and_numbers_of_a_catalogue_change() {
         let report = validate(folder.path(), &Options::default()).unwrap();
         assert!(!report.conformant, "none of its sequences is there");
     };
-    for place in places(whole.len() - 10, 29) {
+    for place in places(whole.len() - 10, 67) {
         look(&whole[..place]);
         let mut bytes = whole.clone();
         bytes[place] ^= 1 << (place % 8);

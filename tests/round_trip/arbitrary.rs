@@ -257,15 +257,25 @@ pub(crate) fn sequences() -> impl Strategy<Value = Sequence> {
         .prop_map(|(seed, rows)| sequence(seed, &rows))
 }
 
+/// Any catalogue.
+pub(crate) fn catalogues() -> impl Strategy<Value = Vec<CatalogueEntry>> {
+    (any::<u64>(), 0_usize..40).prop_map(|(seed, rows)| table(rows, &mut Random::new(seed), |_, _| {}))
+}
+
+/// The canonical bytes of some rows.
+pub(crate) fn bytes_of_rows<R: Record>(rows: &[R]) -> Vec<Vec<u8>> {
+    let bytes = |row: &R| {
+        let mut bytes = Vec::new();
+        row.digest(&mut bytes);
+        bytes
+    };
+    rows.iter().map(bytes).collect()
+}
+
 /// The canonical bytes of every row of every table: equal where every bit is, `NaN` and `-0.0` included.
 pub(crate) fn bytes_of(sequence: &Sequence) -> Vec<(&'static str, Vec<Vec<u8>>)> {
     fn rows<R: Record>(sequence: &Sequence) -> (&'static str, Vec<Vec<u8>>) {
-        let bytes = |row: &R| {
-            let mut bytes = Vec::new();
-            row.digest(&mut bytes);
-            bytes
-        };
-        (R::TABLE.name, R::rows(sequence).iter().map(bytes).collect())
+        (R::TABLE.name, bytes_of_rows(R::rows(sequence)))
     }
     vec![
         rows::<Frame>(sequence),

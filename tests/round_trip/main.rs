@@ -5,7 +5,7 @@ mod arbitrary;
 use std::fs;
 use std::path::Path;
 
-use arbitrary::{bytes_of, sequences};
+use arbitrary::{bytes_of, bytes_of_rows, catalogues, sequences};
 use open_structure::format::{self, Encoding, WriteOptions};
 use open_structure::structure::*;
 use proptest::prelude::*;
@@ -62,6 +62,18 @@ fn sample() -> Sequence {
     sequence.point_correspondences = point_correspondences(&sequence.point_measurements, &[]);
     sequence.frame_statistics = frame_statistics(&sequence);
     sequence
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn a_catalogue_gives_back_what_was_written(rows in catalogues()) {
+        let folder = tempfile::tempdir().unwrap();
+        format::write_catalogue(folder.path(), &rows, false).unwrap();
+        let read = format::read_catalogue(folder.path()).unwrap();
+        prop_assert_eq!(bytes_of_rows(&read), bytes_of_rows(&rows));
+    }
 }
 
 #[test]

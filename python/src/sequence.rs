@@ -73,7 +73,7 @@ impl Sequence {
     fn rows<R: structure::Record>(&self, py: Python<'_>) -> PyResult<Vec<R>> {
         match &self.source {
             Source::File(reader) => work::run(py, errors::of_format, |_| reader.table::<R>()),
-            Source::Memory(sequence) => Ok(R::rows(sequence).clone()),
+            Source::Memory(sequence) => Ok(R::rows(sequence).to_vec()),
         }
     }
 

@@ -74,6 +74,8 @@ fn pytest(tests: &[&str]) {
         .arg("-c")
         .arg(project().join("pyproject.toml"))
         .args(tests.iter().map(|test| project().join("tests").join(test)))
+        // Python looks for modules in the current folder first, and the sources lack the native half.
+        .current_dir(home.path())
         .env("PYTHONPATH", folder.path())
         .env("PYTHONDONTWRITEBYTECODE", "1")
         .env("OPEN_STRUCTURE_OS", os)

@@ -1,6 +1,6 @@
 """Types of the native half; what each name means stands in its docstring."""
 
-from collections.abc import Iterator, Mapping, Sequence as ListLike
+from collections.abc import Iterator, Mapping, Sequence as _List
 from os import PathLike
 from typing import Any, Literal, TypeAlias, final
 
@@ -12,11 +12,12 @@ import pyarrow as pa
 
 from ._report import Report
 
+__all__: list[str]
 __version__: str
 
-Path: TypeAlias = str | PathLike[str]
-Ids: TypeAlias = npt.NDArray[np.int64]
-Numbers: TypeAlias = npt.NDArray[np.float64]
+_Path: TypeAlias = str | PathLike[str]
+_Ids: TypeAlias = npt.NDArray[np.int64]
+_Numbers: TypeAlias = npt.NDArray[np.float64]
 
 @final
 class Column:
@@ -60,7 +61,7 @@ class Frame:
     @property
     def camera_id(self) -> int: ...
     @property
-    def world_from_camera(self) -> Numbers | None: ...
+    def world_from_camera(self) -> _Numbers | None: ...
     @property
     def point_measurements(self) -> Table: ...
     @property
@@ -90,7 +91,7 @@ class Sequence:
     """A sequence: measurements of a camera's way, and what estimators made of them."""
 
     @staticmethod
-    def open(path: Path) -> Sequence: ...
+    def open(path: _Path) -> Sequence: ...
     @property
     def path(self) -> PathLike[str] | None: ...
     @property
@@ -111,9 +112,9 @@ class Sequence:
     def frames(self) -> Frames: ...
     def table(self, name: str) -> Table: ...
     def frame(self, frame_id: int) -> Frame: ...
-    def poses(self, name: str = "truth") -> tuple[Ids, Numbers]: ...
+    def poses(self, name: str = "truth") -> tuple[_Ids, _Numbers]: ...
     def validate(self, *, max_findings: int = 5) -> Report: ...
-    def write(self, path: Path, *, force: bool = False, foxglove: bool = False) -> Sequence: ...
+    def write(self, path: _Path, *, force: bool = False, foxglove: bool = False) -> Sequence: ...
     def with_estimate(
         self,
         name: str,
@@ -129,9 +130,9 @@ class Sequence:
     def __iter__(self) -> Iterator[Frame]: ...
 
 def recipes() -> list[str]: ...
-def simulate(recipe: Path | dict[str, Any], *, seed: int | None = None) -> Sequence: ...
+def simulate(recipe: _Path | dict[str, Any], *, seed: int | None = None) -> Sequence: ...
 def measure(
-    sequence: Sequence | Path,
+    sequence: Sequence | _Path,
     noise: Literal["none", "gaussian", "first-release", "paper", "kinect-disparity"],
     *,
     seed: int = 0,
@@ -145,19 +146,19 @@ def measure(
     complete_depths: bool = False,
 ) -> Sequence: ...
 def track(
-    sequence: Sequence | Path,
+    sequence: Sequence | _Path,
     *,
     method: Literal["map-to-frame", "frame-to-frame"] = "map-to-frame",
     classic: bool = False,
     sensor: Literal["monocular", "stereo", "rgbd"] | None = None,
     baseline: float | None = None,
-    first_pose: ListLike[float] | Numbers | None = None,
+    first_pose: _List[float] | _Numbers | None = None,
     seed: int = 0,
     name: str | None = None,
     replace: bool = False,
 ) -> Sequence: ...
 def graph(
-    sequence: Sequence | Path,
+    sequence: Sequence | _Path,
     *,
     estimate: str | None = None,
     kind: Literal["reprojection", "pose-graph"] = "reprojection",
@@ -173,7 +174,7 @@ def graph(
     replace: bool = False,
 ) -> Sequence: ...
 def adjust(
-    sequence: Sequence | Path,
+    sequence: Sequence | _Path,
     *,
     method: Literal["point", "point-line", "structural", "pose-graph"] = "point-line",
     graph: str | None = None,
@@ -185,7 +186,7 @@ def adjust(
     max_iterations: int | None = None,
     tolerance: float | None = None,
     min_views: int | None = None,
-    fix: ListLike[int] = (),
+    fix: _List[int] = (),
     sigma_px: float | None = None,
     soft: float | None = None,
     no_groups: bool = False,
@@ -197,22 +198,22 @@ def adjust(
     threads: int | None = None,
 ) -> Sequence: ...
 def evaluate(
-    sequence: Sequence | Path,
+    sequence: Sequence | _Path,
     *,
-    estimate: str | ListLike[str] | None = None,
+    estimate: str | _List[str] | None = None,
     reference: str = "truth",
     align: Literal["none", "origin", "se3", "sim3", "scale"] = "se3",
     align_first: int | None = None,
-    relation: str | ListLike[str] | None = None,
+    relation: str | _List[str] | None = None,
     rpe_delta: float = 1.0,
     rpe_unit: Literal["f", "m", "d", "r"] = "f",
     all_pairs: bool = False,
     pairs_from_reference: bool = False,
 ) -> Table: ...
 def evaluate_frames(
-    sequence: Sequence | Path,
+    sequence: Sequence | _Path,
     *,
-    estimate: str | ListLike[str] | None = None,
+    estimate: str | _List[str] | None = None,
     reference: str = "truth",
     align: Literal["none", "origin", "se3", "sim3", "scale"] = "se3",
     align_first: int | None = None,
@@ -221,10 +222,10 @@ def evaluate_frames(
     all_pairs: bool = False,
     pairs_from_reference: bool = False,
 ) -> Table: ...
-def validate(path: Path, *, max_findings: int = 5) -> Report: ...
+def validate(path: _Path, *, max_findings: int = 5) -> Report: ...
 def write_estimate(
-    sequence: Sequence | Path,
-    path: Path,
+    sequence: Sequence | _Path,
+    path: _Path,
     name: str,
     poses: Any | None = None,
     *,

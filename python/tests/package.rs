@@ -80,7 +80,8 @@ fn pytest(tests: &[&str]) {
         .env("PYTHONDONTWRITEBYTECODE", "1")
         .env("OPEN_STRUCTURE_OS", os)
         .env("HOME", home.path())
-        .env("MPLBACKEND", "agg")
+        // Notebooks show their figures themselves.
+        .env_remove("MPLBACKEND")
         .env("MYPYPATH", folder.path())
         .env("MYPY_CACHE_DIR", home.path().join("mypy"))
         .output()

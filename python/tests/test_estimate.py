@@ -56,8 +56,10 @@ def test_maps_go_in_too_and_come_out_again(tracked: Sequence, tmp_path: Path) ->
     assert frame.equals(points.to_polars().drop("estimate"), null_equal=True), "covariances and all"
     frame = made["map_lines"].to_polars().filter(pl.col("estimate") == "mine")
     np.testing.assert_array_equal(frame["end_z"].to_numpy(), lines["end_z"])
-    # Twice the same poses under two names is what the validator warns of, and nothing else.
-    assert {finding.rule for finding in made.validate()} == {"estimates-distinct"}
+    report = made.validate()
+    assert report.conformant, str(report)
+    # Twice the same poses under two names is what the validator sees in it.
+    assert "estimates-distinct" in {rule["rule"] for rule in report.rules}
     found = open_structure.evaluate(made)
     values = found.to_pandas().set_index("estimate")["ape_translation_rmse_m"]
     assert values["mine"] == values["map-to-frame"]

@@ -92,7 +92,8 @@ def test_findings_are_those_of_the_program(folder: Path, tmp_path: Path, run: Ru
     assert "frames" in str(report)
     program = json.loads(run("validate", "--json", broken))
     assert report.json == program
-    assert open_structure.Sequence.open(broken).validate(max_findings=1).json["rules"] == program["rules"]
+    fewer = open_structure.Sequence.open(broken).validate(max_findings=1)
+    assert [(rule["rule"], rule["count"]) for rule in fewer.rules] == [(rule["rule"], rule["count"]) for rule in program["rules"]]
 
 
 def test_a_sequence_in_memory_is_validated_too(tracked: open_structure.Sequence) -> None:

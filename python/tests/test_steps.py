@@ -163,7 +163,8 @@ def test_adjust(options: dict[str, Any], tracked: Sequence, tmp_path: Path, run:
     [
         {},
         {"align": "sim3", "relation": ["trans", "full", "trans"], "align_first": 50},
-        {"align": "none", "rpe_delta": 0.5, "rpe_unit": "m", "all_pairs": True, "pairs_from_reference": True},
+        {"align": "none", "rpe_delta": 45.0, "rpe_unit": "d", "pairs_from_reference": True},
+        {"align": "origin", "rpe_delta": 3.0, "all_pairs": True},
         {"estimate": "map-to-frame", "reference": "point-ba", "relation": "angle-deg"},
     ],
 )
@@ -181,6 +182,16 @@ def test_evaluate(options: dict[str, Any], tracked: Sequence, tmp_path: Path, ru
     import pyarrow.parquet as pq
 
     assert repr(frames.to_pyarrow().to_pylist()) == repr(pq.read_table(errors).to_pylist())
+
+
+def test_what_cannot_be_compared_is_told(tracked: Sequence) -> None:
+    with pytest.warns(UserWarning, match=r"map-to-frame: expected pairs of poses 0.001 m apart"):
+        found = open_structure.evaluate(tracked, rpe_delta=1e-3, rpe_unit="m", all_pairs=True).to_pyarrow().to_pylist()
+    assert found[0]["ape_translation_rmse_m"] > 0.0
+    ids, matrices = tracked.poses("map-to-frame")
+    short = tracked.with_estimate("short", (ids[:1], matrices[:1]))
+    with pytest.warns(UserWarning), pytest.raises(open_structure.StepError):
+        open_structure.evaluate(short, estimate="short")
 
 
 def test_options_that_have_no_meaning(tracked: Sequence, simulated: Sequence) -> None:

@@ -12,7 +12,26 @@ import pyarrow as pa
 
 from ._report import Report
 
-__all__: list[str]
+__all__ = [
+    "Column",
+    "Frame",
+    "FrameIterator",
+    "Frames",
+    "Sequence",
+    "Table",
+    "__version__",
+    "adjust",
+    "evaluate",
+    "evaluate_frames",
+    "graph",
+    "measure",
+    "recipes",
+    "simulate",
+    "track",
+    "validate",
+    "write_estimate",
+]
+
 __version__: str
 
 _Path: TypeAlias = str | PathLike[str]

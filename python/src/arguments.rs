@@ -47,13 +47,11 @@ impl Given<'_> {
 
 /// The value of a name.
 pub(crate) fn choice<T: Copy>(option: &str, found: &str, choices: &[(&str, T)]) -> PyResult<T> {
-    match choices.iter().find(|(name, _)| *name == found) {
-        Some((_, value)) => Ok(*value),
-        None => {
-            let names: Vec<String> = choices.iter().map(|(name, _)| format!("`{name}`")).collect();
-            Err(errors::option(format!("{option}: expected one of {}, found `{found}`", names.join(", "))))
-        }
+    if let Some((_, value)) = choices.iter().find(|(name, _)| *name == found) {
+        return Ok(*value);
     }
+    let names: Vec<String> = choices.iter().map(|(name, _)| format!("`{name}`")).collect();
+    Err(errors::option(format!("{option}: expected one of {}, found `{found}`", names.join(", "))))
 }
 
 /// A whole number over zero.

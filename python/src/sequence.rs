@@ -63,7 +63,7 @@ impl Sequence {
         match &self.source {
             Source::Memory(sequence) => Ok(Arc::clone(sequence)),
             Source::File(reader) => {
-                self.tell_left_behind(py, reader)?;
+                tell_left_behind(py, reader)?;
                 work::run(py, errors::of_format, |_| reader.read_all()).map(Arc::new)
             }
         }
@@ -100,18 +100,6 @@ impl Sequence {
                 name.map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
             }
         }
-    }
-
-    fn tell_left_behind(&self, py: Python<'_>, reader: &SequenceReader) -> PyResult<()> {
-        let columns = reader.tables().into_iter().flat_map(|stored| {
-            let table = stored.table.name;
-            stored.unknown_columns.into_iter().map(move |column| format!("column {column} of {table}"))
-        });
-        for name in reader.passed_over().iter().cloned().chain(columns) {
-            let text = format!("{name} is not known to this version and is not copied");
-            py.import("warnings")?.call_method1("warn", (text,))?;
-        }
-        Ok(())
     }
 }
 
@@ -293,7 +281,7 @@ impl Sequence {
         match &self.source {
             Source::File(reader) => {
                 refuse_itself(reader.path(), &path)?;
-                self.tell_left_behind(py, reader)?;
+                tell_left_behind(py, reader)?;
                 work::run(py, errors::of_format, |watch| {
                     format::copy(reader, &path, options, &|_, _| watch.progress())
                 })?;
@@ -367,6 +355,19 @@ pub(crate) fn matrix(pose: &Pose) -> [f64; 16] {
 fn refuse_itself(input: &Path, output: &Path) -> PyResult<()> {
     if storage::exists(output) && storage::holds(output, input) {
         return Err(errors::option(format!("{}: is the input itself, or holds it", output.display())));
+    }
+    Ok(())
+}
+
+/// Warns of what this version does not know, and so does not copy.
+fn tell_left_behind(py: Python<'_>, reader: &SequenceReader) -> PyResult<()> {
+    let columns = reader.tables().into_iter().flat_map(|stored| {
+        let table = stored.table.name;
+        stored.unknown_columns.into_iter().map(move |column| format!("column {column} of {table}"))
+    });
+    for name in reader.passed_over().iter().cloned().chain(columns) {
+        let text = format!("{name} is not known to this version and is not copied");
+        py.import("warnings")?.call_method1("warn", (text,))?;
     }
     Ok(())
 }

@@ -84,7 +84,7 @@ fn side_by_side<T: Send, E: Send>(
         while wait.recv_timeout(PATIENCE) == Err(RecvTimeoutError::Timeout) {
             // Once is enough: the work is left as soon as it can be.
             if interrupt.is_none() {
-                interrupt = Python::attach(|py| py.check_signals()).err();
+                interrupt = Python::attach(|py| py.check_signals().err());
                 watch.interrupted.store(interrupt.is_some(), Ordering::Relaxed);
             }
         }

@@ -48,6 +48,8 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
 
+use crate::stations;
+
 /// Measurements instead of images: tools for Open-Structure sequences.
 ///
 /// A sequence is an MCAP file (NAME.mcap) or a Parquet folder (NAME/ with sequence.json). Every
@@ -151,9 +153,20 @@ pub fn main() -> ExitCode {
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             let red = if io::stderr().is_terminal() { ("\u{1b}[1;31m", "\u{1b}[0m") } else { ("", "") };
-            let _ = writeln!(io::stderr(), "{}error{}: {error:#}", red.0, red.1);
+            let _ = writeln!(io::stderr(), "{}error{}: {error:#}{}", red.0, red.1, remedy(&error));
             ExitCode::FAILURE
         }
+    }
+}
+
+/// Which option helps against an error of a room that knows nothing of options.
+fn remedy(error: &anyhow::Error) -> &'static str {
+    match error.chain().find_map(|cause| cause.downcast_ref::<stations::Error>()) {
+        Some(stations::Error::Taken { .. }) => " (--name NAME, --replace)",
+        Some(stations::Error::NoTruth { .. }) => " (--reference NAME)",
+        Some(stations::Error::Several { kind: "graph", .. }) => " (--graph NAME)",
+        Some(stations::Error::Several { .. }) => " (--estimate NAME)",
+        _ => "",
     }
 }
 

@@ -2,8 +2,13 @@
 
 use std::path::PathBuf;
 
+use crate::adjust;
+use crate::covisibility;
+use crate::evaluate;
+use crate::geometry;
+use crate::simulate;
 use crate::structure::{CameraId, FrameId};
-use crate::{adjust, covisibility, evaluate, geometry, simulate, track};
+use crate::track;
 
 /// Errors of this room.
 #[derive(Debug, thiserror::Error)]

@@ -88,18 +88,18 @@ fn scheme(path: &Path) -> Option<(&'static str, &str)> {
 pub fn find(path: &Path) -> io::Result<Found> {
     match Object::at(path)? {
         Some(object) => object.find(),
-        None => found(&fs::metadata(path)?),
+        None => Ok(found(&fs::metadata(path)?)),
     }
 }
 
-fn found(metadata: &fs::Metadata) -> io::Result<Found> {
-    Ok(if metadata.is_dir() {
+fn found(metadata: &fs::Metadata) -> Found {
+    if metadata.is_dir() {
         Found::Folder
     } else if metadata.is_file() {
         Found::File(metadata.len())
     } else {
         Found::Other
-    })
+    }
 }
 
 /// Whether anything stands at a place, a link that leads nowhere too.
@@ -156,7 +156,7 @@ pub fn list(folder: &Path, known: &[&str]) -> io::Result<Vec<Entry>> {
             let entry = entry?;
             // A link that leads nowhere is there all the same.
             let metadata = fs::metadata(entry.path()).or_else(|_| entry.metadata())?;
-            Ok(Entry { name: entry.file_name(), found: found(&metadata)? })
+            Ok(Entry { name: entry.file_name(), found: found(&metadata) })
         });
         entries.collect::<io::Result<Vec<_>>>()?
     };
@@ -300,9 +300,9 @@ pub(crate) fn remove(path: &Path) -> io::Result<bool> {
         found => found?,
     };
     if found.is_dir() {
-        fs::remove_dir_all(path)?
+        fs::remove_dir_all(path)?;
     } else {
-        fs::remove_file(path)?
+        fs::remove_file(path)?;
     }
     Ok(true)
 }

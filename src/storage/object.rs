@@ -141,9 +141,8 @@ impl Object {
     /// Makes it what a file of this machine is, all at once.
     pub(super) fn put(&self, from: &Path) -> io::Result<()> {
         let mut file = fs::File::open(from)?;
-        let length = file.metadata()?.len();
-        if length <= PART as u64 || !self.lists {
-            let mut bytes = Vec::with_capacity(length as usize);
+        if file.metadata()?.len() <= PART as u64 || !self.lists {
+            let mut bytes = Vec::new();
             file.read_to_end(&mut bytes)?;
             return wait(self.store.put(&self.key, bytes.into())).map(drop);
         }
@@ -151,25 +150,13 @@ impl Object {
         let runtime = runtime()?;
         let _inside = runtime.enter();
         let mut upload = WriteMultipart::new_with_chunk_size(upload, PART);
-        let sent = self.send_parts(&mut file, &mut upload);
-        match sent {
+        match send_parts(&mut file, &mut upload) {
             Ok(()) => runtime.block_on(upload.finish()).map(drop).map_err(failed),
             Err(error) => {
                 // What is there already may be paid for; the first error is the one to tell.
                 let _ = runtime.block_on(upload.abort());
                 Err(error)
             }
-        }
-    }
-
-    fn send_parts(&self, file: &mut fs::File, upload: &mut WriteMultipart) -> io::Result<()> {
-        loop {
-            let mut part = Vec::with_capacity(PART);
-            if file.by_ref().take(PART as u64).read_to_end(&mut part)? == 0 {
-                return Ok(());
-            }
-            wait(upload.wait_for_capacity(PARTS_AT_ONCE))?;
-            upload.put(part.into());
         }
     }
 
@@ -191,6 +178,18 @@ impl Object {
             Err(_) if !self.lists => Ok(()),
             done => done,
         }
+    }
+}
+
+/// Sends a file part by part.
+fn send_parts(file: &mut fs::File, upload: &mut WriteMultipart) -> io::Result<()> {
+    loop {
+        let mut part = Vec::with_capacity(PART);
+        if file.by_ref().take(PART as u64).read_to_end(&mut part)? == 0 {
+            return Ok(());
+        }
+        wait(upload.wait_for_capacity(PARTS_AT_ONCE))?;
+        upload.put(part.into());
     }
 }
 

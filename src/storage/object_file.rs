@@ -9,11 +9,11 @@ use bytes::Bytes;
 use super::object::Object;
 
 /// Bytes of a block: about what a network delivers in the time that a request takes.
-const BLOCK: u64 = 1 << 18;
+const BLOCK: usize = 1 << 18;
 /// Blocks that are fetched at once by who reads on from block to block.
 const AHEAD: u64 = 8;
 /// Blocks that are kept: each column of a table is read at a place of its own.
-const KEPT: usize = 16 * AHEAD as usize;
+const KEPT: usize = 128;
 
 /// An object that is open for reading.
 #[derive(Debug)]
@@ -47,7 +47,7 @@ impl ObjectFile {
             whole.seek(SeekFrom::Start(offset))?;
             return whole.read(buffer);
         }
-        let number = offset / BLOCK;
+        let number = offset / BLOCK as u64;
         let block = match self.kept(number).map_or_else(|| self.fetch(number), Ok) {
             Err(error) if error.kind() == io::ErrorKind::Unsupported => {
                 self.fetch_whole()?;
@@ -55,7 +55,8 @@ impl ObjectFile {
             }
             block => block?,
         };
-        let rest = block.get((offset - number * BLOCK) as usize..).unwrap_or_default();
+        let start = usize::try_from(offset % BLOCK as u64).unwrap_or(BLOCK);
+        let rest = block.get(start..).unwrap_or_default();
         if rest.is_empty() {
             return Err(io::Error::new(
                 io::ErrorKind::UnexpectedEof,
@@ -80,18 +81,18 @@ impl ObjectFile {
     fn fetch(&self, number: u64) -> io::Result<Bytes> {
         let reads_on = number > 0 && self.kept(number - 1).is_some();
         let count = if reads_on { AHEAD } else { 1 };
-        let end = (number + count).saturating_mul(BLOCK).min(self.length);
-        let fetched = self.object.range(number * BLOCK..end, self.tag.as_deref())?;
+        let end = (number + count).saturating_mul(BLOCK as u64).min(self.length);
+        let fetched = self.object.range(number * BLOCK as u64..end, self.tag.as_deref())?;
         let mut blocks = self.blocks.lock().unwrap_or_else(PoisonError::into_inner);
-        for (place, start) in (0..fetched.len()).step_by(BLOCK as usize).enumerate() {
-            let block = fetched.slice(start..fetched.len().min(start + BLOCK as usize));
+        for (place, start) in (0..fetched.len()).step_by(BLOCK).enumerate() {
+            let block = fetched.slice(start..fetched.len().min(start + BLOCK));
             if blocks.len() == KEPT {
                 blocks.remove(0);
             }
             blocks.push((number + place as u64, block));
         }
         drop(blocks);
-        Ok(fetched.slice(..fetched.len().min(BLOCK as usize)))
+        Ok(fetched.slice(..fetched.len().min(BLOCK)))
     }
 
     /// Copies the object to this machine; the copy goes with its last reader.

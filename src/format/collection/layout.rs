@@ -66,7 +66,7 @@ impl Collection {
             }
             match sequence_name(&name) {
                 Some(name) if listed.found == Found::Folder => {
-                    found.members.push(Member { name, path: entry })
+                    found.members.push(Member { name, path: entry });
                 }
                 _ if name == names::CATALOGUE_FILE => found.has_catalogue = true,
                 _ if is_sequence(&entry, listed.found) => found.outside.push(entry),

@@ -4,6 +4,11 @@
 //! Credentials and endpoints come from the environment, by the names that the stores' own programs use (`AWS_…`, `GOOGLE_…`).
 //! Without the feature `remote` a URL is an error.
 
+#![cfg_attr(
+    not(feature = "remote"),
+    expect(unreachable_code, reason = "without the feature there is no object")
+)]
+
 mod file;
 #[cfg(feature = "remote")]
 mod object;

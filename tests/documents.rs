@@ -4,20 +4,41 @@
 //!
 //! * `<!-- run -->` before a block of `console`: its commands are run, and what they print stands behind each;
 //!   before a block of `python`: it is run, and what it prints is the block of `text` behind it, if there is one.
+//! * `<!-- check -->` before a block of `console`: its commands are run, and what they print is nobody's business.
+//! * `<!-- before: COMMAND -->`: is run and not seen; it makes what stands for data that readers have.
 //! * `<!-- file: NAME -->` before any block: it becomes a file.
+//! * `<!-- elsewhere: FILE -->` before a block, or at the top of a page for all of its blocks: not run here but there.
+//!
+//! A page that speaks of object stores has some: one server on this machine is `s3://…` and `gs://…`, and what stands in the
+//! folder `example.org` is at `https://example.org/…`.
 //!
 //! `UPDATE_README=1 cargo test --workspace --test documents` writes the output anew.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
+
+#[expect(dead_code, reason = "shared with a test that needs more of it")]
+#[path = "storage/server.rs"]
+mod server;
 
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use server::{Kind, Server};
+
 const RUN: &str = "<!-- run -->";
+const CHECK: &str = "<!-- check -->";
+const BEFORE: &str = "<!-- before: ";
 const FILE: &str = "<!-- file: ";
+const ELSEWHERE: &str = "<!-- elsewhere: ";
+const END: &str = " -->";
 const FENCE: &str = "```";
+/// Where readers find what the folder `example.org` has.
+const SITE: &str = "https://example.org";
+/// A key of Google's that needs nobody's signature.
+const GOOGLE_KEY: &str =
+    r#"{"private_key": "", "private_key_id": "", "client_email": "", "disable_oauth": true}"#;
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
@@ -49,41 +70,81 @@ fn markdown(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// What a command prints; it must succeed, be it with findings (3).
-fn printed(program: &str, arguments: &[&str], folder: &Path) -> String {
-    let mut path = vec![programs().to_owned()];
-    path.extend(python());
-    path.extend(std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default()));
-    let output = Command::new(program)
-        .args(arguments)
-        .current_dir(folder)
-        .env("PATH", std::env::join_paths(path).unwrap())
-        .env("COLUMNS", "100")
-        .output()
-        .unwrap();
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(
-        matches!(output.status.code(), Some(0 | 3)),
-        "{arguments:?}: {:?}\n{errors}",
-        output.status.code()
-    );
-    let said = String::from_utf8_lossy(&output.stdout);
-    said.lines().fold(String::new(), |mut lines, line| {
-        let _ = writeln!(lines, "{}", line.trim_end());
-        lines
-    })
+/// Where a document's commands run.
+struct Shell<'a> {
+    folder: &'a Path,
+    store: Option<Server>,
 }
 
-/// Runs the commands of a block; gives the block with what they print now.
-fn console(block: &str, folder: &Path) -> String {
-    block.lines().filter_map(|line| line.strip_prefix("$ ")).fold(String::new(), |mut text, command| {
-        let _ = write!(text, "$ {command}\n{}", printed("sh", &["-c", command], folder));
-        text
-    })
+impl<'a> Shell<'a> {
+    fn new(folder: &'a Path) -> Self {
+        Self { folder, store: None }
+    }
+
+    fn for_document(text: &str, folder: &'a Path) -> Self {
+        let remote = ["s3://", "gs://", SITE].iter().any(|start| text.contains(start));
+        Self { folder, store: remote.then(|| Server::new(Kind::Buckets)) }
+    }
+
+    /// What a command prints; it must succeed, be it with findings (3).
+    fn printed(&self, program: &str, arguments: &[&str]) -> String {
+        let mut path = vec![programs().to_owned()];
+        path.extend(python());
+        path.extend(std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default()));
+        let mut command = Command::new(program);
+        command
+            .current_dir(self.folder)
+            .env("PATH", std::env::join_paths(path).unwrap())
+            .env("COLUMNS", "100");
+        let mut site = SITE.to_owned();
+        if let Some(store) = &self.store {
+            site = format!("http://{}", store.address);
+            command
+                .envs([
+                    ("AWS_ENDPOINT_URL", site.as_str()),
+                    ("AWS_REGION", "here"),
+                    ("GOOGLE_BASE_URL", &site),
+                ])
+                .envs([("AWS_ACCESS_KEY_ID", "someone"), ("AWS_SECRET_ACCESS_KEY", "something")])
+                .env("GOOGLE_SERVICE_ACCOUNT_KEY", GOOGLE_KEY);
+        }
+        let output = command.args(arguments.iter().map(|text| text.replace(SITE, &site))).output().unwrap();
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert!(
+            matches!(output.status.code(), Some(0 | 3)),
+            "{arguments:?}: {:?}\n{errors}",
+            output.status.code()
+        );
+        let said = String::from_utf8_lossy(&output.stdout);
+        said.lines().fold(String::new(), |mut lines, line| {
+            let _ = writeln!(lines, "{}", line.trim_end());
+            lines
+        })
+    }
+
+    /// Runs the commands of a block; gives the block with what they print now.
+    fn console(&self, block: &str) -> String {
+        block.lines().filter_map(|line| line.strip_prefix("$ ")).fold(String::new(), |mut text, command| {
+            let _ = write!(text, "$ {command}\n{}", self.printed("sh", &["-c", command]));
+            text
+        })
+    }
+
+    /// Runs what readers do not see.
+    fn prepare(&self, command: &str) {
+        self.printed("sh", &["-c", command]);
+        let site = self.folder.join("example.org");
+        if let (Some(store), true) = (&self.store, site.is_dir()) {
+            for entry in site.read_dir().unwrap() {
+                let entry = entry.unwrap();
+                store.keep(entry.file_name().to_str().unwrap(), fs::read(entry.path()).unwrap());
+            }
+        }
+    }
 }
 
 /// A document as it should be.
-fn executed(found: &str, folder: &Path) -> String {
+fn executed(found: &str, shell: &Shell<'_>) -> String {
     let mut expected = String::new();
     let mut lines = found.split_inclusive('\n').peekable();
     let block = |lines: &mut std::iter::Peekable<std::str::SplitInclusive<'_, char>>| {
@@ -92,7 +153,10 @@ fn executed(found: &str, folder: &Path) -> String {
     while let Some(line) = lines.next() {
         expected.push_str(line);
         let marker = line.trim_end();
-        if marker != RUN && !marker.starts_with(FILE) {
+        if let Some(command) = marker.strip_prefix(BEFORE) {
+            shell.prepare(command.trim_end_matches(END));
+        }
+        if ![RUN, CHECK].contains(&marker) && !marker.starts_with(FILE) {
             continue;
         }
         let fence = lines.next().unwrap();
@@ -101,16 +165,20 @@ fn executed(found: &str, folder: &Path) -> String {
         let content = block(&mut lines);
         let shown = match (marker.strip_prefix(FILE), language) {
             (Some(name), _) => {
-                fs::write(folder.join(name.trim_end_matches(" -->")), &content).unwrap();
+                fs::write(shell.folder.join(name.trim_end_matches(END)), &content).unwrap();
                 content
             }
-            (None, "console") => console(&content, folder),
-            (None, "python") => content,
-            (None, other) => panic!("{RUN} before a block of {other:?}"),
+            (None, "console") if marker == CHECK => {
+                shell.console(&content);
+                content
+            }
+            (None, "console") => shell.console(&content),
+            (None, "python") if marker == RUN => content,
+            (None, other) => panic!("{marker} before a block of {other:?}"),
         };
         let _ = writeln!(expected, "{fence}{shown}{FENCE}");
         if marker == RUN && language == "python" {
-            let said = printed("python", &["-c", &shown], folder);
+            let said = shell.printed("python", &["-c", &shown]);
             if lines.peek().is_some_and(|line| line.trim().is_empty()) {
                 expected.push_str(lines.next().unwrap());
             }
@@ -123,9 +191,30 @@ fn executed(found: &str, folder: &Path) -> String {
     expected
 }
 
+/// Commands of a page that nobody runs: blocks of `console` and `python` without a marker.
+fn never_run(text: &str) -> Vec<String> {
+    let marks =
+        |line: &str| [RUN, CHECK].contains(&line) || line.starts_with(FILE) || line.starts_with(ELSEWHERE);
+    let mut found = Vec::new();
+    let mut before = "";
+    let mut in_code = false;
+    let whole_page = text.lines().next().is_some_and(|line| line.starts_with(ELSEWHERE));
+    for (number, line) in text.lines().enumerate() {
+        if let Some(language) = line.strip_prefix(FENCE) {
+            in_code = !in_code;
+            if in_code && !whole_page && matches!(language, "console" | "python") && !marks(before) {
+                found.push(format!("line {}: a block of {language}", number + 1));
+            }
+        }
+        before = line;
+    }
+    found
+}
+
 /// Help of a program and its commands, as the book has it.
 fn help(program: &str, folder: &Path) -> String {
-    let own = printed(program, &["--help"], folder);
+    let shell = Shell::new(folder);
+    let own = shell.printed(program, &["--help"]);
     let mut text = format!("## {program}\n\n{FENCE}text\n{own}{FENCE}\n");
     let commands =
         own.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
@@ -135,8 +224,8 @@ fn help(program: &str, folder: &Path) -> String {
     for command in commands.filter(|command| *command != "help") {
         let said = match (program, command) {
             // Hands over to the other program.
-            ("os", "convert") => printed(program, &["help", command], folder),
-            _ => printed(program, &[command, "--help"], folder),
+            ("os", "convert") => shell.printed(program, &["help", command]),
+            _ => shell.printed(program, &[command, "--help"]),
         };
         let _ = write!(text, "\n### {program} {command}\n\n{FENCE}text\n{said}{FENCE}\n");
     }
@@ -185,7 +274,7 @@ fn runs(path: &Path) -> Result<(), String> {
     let folder = tempfile::tempdir().unwrap();
     #[cfg(unix)]
     std::os::unix::fs::symlink(root().join("sequences"), folder.path().join("sequences")).unwrap();
-    hold(path, &executed(&found, folder.path()))
+    hold(path, &executed(&found, &Shell::for_document(&found, folder.path())))
 }
 
 #[test]
@@ -208,6 +297,21 @@ fn the_book_shows_what_the_programs_print() {
             wrong.join("\n")
         );
     }
+}
+
+#[test]
+fn no_command_stands_in_the_book_that_is_never_run() {
+    let mut elsewhere = 0;
+    for page in markdown(&root().join("docs/src")) {
+        let text = fs::read_to_string(&page).unwrap();
+        assert_eq!(never_run(&text), [""; 0], "{}", page.display());
+        for place in text.lines().filter_map(|line| line.strip_prefix(ELSEWHERE)) {
+            let place = place.trim_end_matches(END);
+            assert!(root().join(place).is_file(), "{}: no {place}", page.display());
+            elsewhere += 1;
+        }
+    }
+    assert!(elsewhere < 10, "{elsewhere} blocks are not run here");
 }
 
 #[test]

@@ -18,7 +18,7 @@ use crate::structure::Sequence;
 pub fn load(name: &str) -> Result<Sequence, Error> {
     let path = Path::new(name);
     let recipe = |cause| Error::Recipe { name: name.to_owned(), cause };
-    let is_recipe = path.extension().is_some_and(|extension| extension == "toml");
+    let is_recipe = storage::without_query(path).extension().is_some_and(|extension| extension == "toml");
     if storage::exists(path) && !is_recipe {
         return Ok(format::read(path)?);
     }

@@ -262,7 +262,9 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     if let Some(from) = args.from.map_or_else(|| foreign::of(&args.input), |from| Ok(Some(from)))? {
         return adjust_foreign::run(args, from, stdout);
     }
-    if storage::is_file(&args.input) && args.input.extension().is_none_or(|extension| extension != "mcap") {
+    if storage::is_file(&args.input)
+        && storage::without_query(&args.input).extension().is_none_or(|extension| extension != "mcap")
+    {
         format::open(&args.input).map(drop).with_context(|| {
             let input = args.input.display();
             format!(

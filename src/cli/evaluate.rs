@@ -252,7 +252,8 @@ pub(super) fn name_of(path: &Path) -> String {
     if storage::is_folder(path) {
         return inputs::called(path).unwrap_or_else(|| path.display().to_string());
     }
-    path.file_stem().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
+    let name = storage::without_query(path).file_stem();
+    name.map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
 }
 
 impl Args {

@@ -30,14 +30,14 @@ use crate::storage::{self, File};
   os fetch office1 --mirror /data/icl-nuim          from a disk; or from http://...
   os fetch my-dataset.toml -o images --keep-archives
 
-What is being downloaded lies in NAME.download/ beside the folder.")]
+What is being downloaded lies in NAME.download/ beside the folder, for a URL in the current one.")]
 pub(super) struct Args {
     /// Recipe: a file, or the name of one that travels with the program; without it, these are listed.
     recipe: Option<String>,
     /// Which files.
     #[arg(long, value_enum, default_value_t, requires = "recipe")]
     what: WhatArg,
-    /// Folder to make; by default the name of the sequence.
+    /// Folder to make, or URL; by default the name of the sequence.
     #[arg(short, long, value_name = "DIR", requires = "recipe")]
     output: Option<PathBuf>,
     /// Folder or URL that has the files, instead of those of the recipe.
@@ -95,7 +95,6 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         ..Options::default()
     };
     let into = args.output.clone().unwrap_or_else(|| PathBuf::from(&recipe.name));
-    storage::on_this_machine(&into).with_context(|| into.display().to_string())?;
     let progress = FetchProgress::default();
     let fetched = fetch::fetch(&recipe, &into, &options, &|event| progress.show(&event))?;
     drop(progress);

@@ -83,5 +83,6 @@ pub(super) fn of(input: &Path) -> anyhow::Result<Option<Foreign>> {
 
 /// Whether a name ends as those of such files do.
 pub(super) fn has_extension(path: &Path, kind: Foreign) -> bool {
+    let path = storage::without_query(path);
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(kind.extension()))
 }

@@ -138,7 +138,8 @@ pub(super) fn source_files(paths: Vec<PathBuf>) -> anyhow::Result<Vec<SourceFile
             bytes += length as u64;
             file.consume(length);
         }
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let name =
+            storage::without_query(&path).file_name().unwrap_or_default().to_string_lossy().into_owned();
         Ok(SourceFile { name, bytes, sha256: hex(&hasher.finalize()) })
     };
     paths.into_iter().map(file).collect()
@@ -149,8 +150,12 @@ pub(super) fn name(given: Option<&str>, input: &Path) -> anyhow::Result<String> 
     let name = if let Some(name) = given {
         name.to_owned()
     } else {
-        let path = if storage::is_url(input) { input.to_owned() } else { input.canonicalize()? };
-        let name = if storage::is_folder(&path) { path.file_name() } else { path.file_stem() };
+        let path = if storage::is_url(input) {
+            storage::without_query(input).to_owned()
+        } else {
+            input.canonicalize()?
+        };
+        let name = if storage::is_folder(input) { path.file_name() } else { path.file_stem() };
         name.unwrap_or_default().to_string_lossy().into_owned()
     };
     if name.is_empty() || name.chars().any(|letter| "/\\".contains(letter) || letter.is_control()) {

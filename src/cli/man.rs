@@ -1,13 +1,12 @@
 //! `os man`: man pages.
 
-use std::fs;
 use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::Context;
 
 use super::{Outcome, program};
-use crate::storage::on_this_machine;
+use crate::storage::Outgoing;
 
 /// Write man pages: one for the program and one for each command.
 #[derive(clap::Args, Debug)]
@@ -29,8 +28,8 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         stdout.write_all(&page)?;
         return Ok(Outcome::Done);
     };
-    on_this_machine(folder).with_context(|| format!("{}", folder.display()))?;
-    fs::create_dir_all(folder).with_context(|| format!("{}", folder.display()))?;
-    clap_mangen::generate_to(command, folder).with_context(|| format!("{}", folder.display()))?;
+    let pages = Outgoing::folder(folder).with_context(|| format!("{}", folder.display()))?;
+    clap_mangen::generate_to(command, pages.path()).with_context(|| format!("{}", folder.display()))?;
+    pages.finish().with_context(|| format!("{}", folder.display()))?;
     Ok(Outcome::Done)
 }

@@ -12,6 +12,7 @@ use super::store::{Stored, stored};
 use super::{Error, Event, Mirror, Patience, part_file};
 use crate::archive::{self, Limits, Selection};
 use crate::datasets::{Part, Recipe, RemoteFile};
+use crate::storage;
 use crate::unfinished::Unfinished;
 
 /// Which files of a recipe.
@@ -73,12 +74,12 @@ pub struct FetchedFile {
     pub left_out: u64,
 }
 
-/// Where files of a folder are downloaded to: `NAME.download`, beside it.
+/// Where files of a folder are downloaded to: `NAME.download`, beside it; for a URL in the current folder.
 #[must_use]
 pub fn download_folder(into: &Path) -> PathBuf {
     let mut name = into.file_name().unwrap_or_default().to_owned();
     name.push(".download");
-    into.with_file_name(name)
+    if storage::is_url(into) { PathBuf::from(name) } else { into.with_file_name(name) }
 }
 
 /// Fetches the files of a recipe into a new folder.
@@ -106,12 +107,14 @@ pub fn fetch(
         }
     };
     // `a/..` and `..` have no name of their own.
-    let into = if into.file_name().is_some() {
+    let into = if storage::is_url(into) {
+        into.to_owned()
+    } else if into.file_name().is_some() {
         into.components().collect::<PathBuf>()
     } else {
         into.canonicalize().map_err(Error::io(into))?
     };
-    if !options.force && into.symlink_metadata().is_ok() {
+    if !options.force && storage::is_taken(&into).map_err(Error::io(&into))? {
         return Err(Error::Exists { path: into });
     }
     if let Some(Mirror::Folder(mirror)) = &options.mirror
@@ -154,7 +157,7 @@ pub fn fetch(
     if !temporary.join(&folder).is_dir() {
         return Err(Error::NoFolder { sequence, folder });
     }
-    if !options.force && into.symlink_metadata().is_ok() {
+    if !options.force && storage::is_taken(&into).map_err(Error::io(&into))? {
         return Err(Error::Exists { path: into });
     }
     unfinished.finish().map_err(Error::io(&into))?;

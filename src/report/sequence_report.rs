@@ -121,7 +121,8 @@ impl SequenceReport {
         let mut validation = validate::validate(path, &rules)?;
         // The same page wherever the file lies.
         validation.path = None;
-        let name = if storage::is_folder(path) { path.file_name() } else { path.file_stem() };
+        let place = storage::without_query(path);
+        let name = if storage::is_folder(path) { place.file_name() } else { place.file_stem() };
         Ok(Self {
             file: name.map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned()),
             encoding: reader.encoding().name(),

@@ -34,7 +34,7 @@ pub fn simulation_recipe(name: &str) -> Result<(Recipe, PathBuf), Error> {
     if bytes as u64 > MAX_RECIPE_BYTES {
         return Err(Error::RecipeSize { path: path.to_owned(), limit: MAX_RECIPE_BYTES });
     }
-    let recipe = if path.extension().is_some_and(|extension| extension == "json") {
+    let recipe = if storage::without_query(path).extension().is_some_and(|extension| extension == "json") {
         let recipe: Recipe = serde_json::from_str(&text)
             .map_err(|cause| Error::RecipeJson { name: name.to_owned(), cause })?;
         recipe.check().map_err(wrong)?;

@@ -83,6 +83,16 @@ fn scheme(path: &Path) -> Option<(&'static str, &str)> {
     Some((scheme, rest.strip_prefix('/').unwrap_or(rest)))
 }
 
+/// A place by its name alone: of a URL over HTTP what stands behind `?`, as in signed ones, is left out.
+#[must_use]
+pub fn without_query(path: &Path) -> &Path {
+    let end = match scheme(path) {
+        Some(("http" | "https", _)) => path.to_str().and_then(|text| text.find('?')),
+        _ => None,
+    };
+    end.and_then(|end| path.to_str()?.get(..end)).map_or(path, Path::new)
+}
+
 /// What stands at a place, links followed.
 ///
 /// Of a URL over HTTP, where nothing can be listed, a folder is what has one of `sequence.json`, `catalogue.parquet` and
@@ -256,7 +266,7 @@ impl Local {
             return Ok(Self { path: path.to_owned(), _copy: None });
         }
         let folder = tempfile::tempdir()?;
-        let copy = folder.path().join(path.file_name().unwrap_or("root".as_ref()));
+        let copy = folder.path().join(without_query(path).file_name().unwrap_or("root".as_ref()));
         copy_into(path, &copy, known)?;
         Ok(Self { path: copy, _copy: Some(folder) })
     }
@@ -266,6 +276,57 @@ impl Local {
     pub fn path(&self) -> &Path {
         &self.path
     }
+}
+
+/// A folder that files are written into: itself, or for a URL one of this machine, of which the files are sent.
+#[derive(Debug)]
+pub struct Outgoing {
+    target: PathBuf,
+    /// Where files of a URL wait; it goes with this value.
+    waiting: Option<tempfile::TempDir>,
+}
+
+impl Outgoing {
+    /// A folder, made where it is missing.
+    ///
+    /// # Errors
+    /// Those of the file system.
+    pub fn folder(target: &Path) -> io::Result<Self> {
+        let waiting = if Object::at(target)?.is_some() {
+            Some(tempfile::tempdir()?)
+        } else {
+            fs::create_dir_all(target)?;
+            None
+        };
+        Ok(Self { target: target.to_owned(), waiting })
+    }
+
+    /// Where files are to be written, on this machine.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        self.waiting.as_ref().map_or(&self.target, |waiting| waiting.path())
+    }
+
+    /// Sends what was written, if it has to be sent; what else stands there stays.
+    ///
+    /// # Errors
+    /// Those of the file system or the network.
+    pub fn finish(self) -> io::Result<()> {
+        self.waiting.as_ref().map_or(Ok(()), |waiting| send_files(waiting.path(), &self.target))
+    }
+}
+
+/// Sends the files of a folder, and those of the folders in it.
+fn send_files(from: &Path, url: &Path) -> io::Result<()> {
+    for entry in list(from, &[])? {
+        let (from, url) = (from.join(&entry.name), url.join(&entry.name));
+        if entry.found == Found::Folder {
+            send_files(&from, &url)?;
+        } else if let Some(object) = Object::at(&url)? {
+            object.put(&from)?;
+        }
+    }
+    Ok(())
 }
 
 /// Copies what a URL names, folders with all that is in them.
@@ -421,6 +482,19 @@ mod tests {
         }
         for path in ["box1", "/s3/a", "s3", "s3:", "ftp://host/a", "C:/a", "./s3://a", ""] {
             assert!(!is_url(Path::new(path)), "{path}");
+        }
+    }
+
+    #[test]
+    fn names_end_before_a_query() {
+        for (url, expected) in [
+            ("https://host/a.mcap?download=1", "https://host/a.mcap"),
+            ("http://host/a.mcap?by=a/b?c", "http://host/a.mcap"),
+            ("https://host/a.mcap", "https://host/a.mcap"),
+            ("s3://bucket/what?", "s3://bucket/what?"),
+            ("here/what?.mcap", "here/what?.mcap"),
+        ] {
+            assert_eq!(without_query(Path::new(url)), Path::new(expected));
         }
     }
 

@@ -38,6 +38,8 @@ pub(super) struct Object {
     key: Key,
     /// Whether the store lists what is in it; HTTP does not.
     lists: bool,
+    /// Whether the URL has more than a place, as signed ones have: it is good for one file, and perhaps for GET alone.
+    has_query: bool,
 }
 
 impl Object {
@@ -45,18 +47,27 @@ impl Object {
     pub(super) fn at(path: &Path) -> io::Result<Option<Self>> {
         let Some((scheme, rest)) = scheme(path) else { return Ok(None) };
         let invalid = |what: String| io::Error::new(io::ErrorKind::InvalidInput, what);
+        let is_http = matches!(scheme, "http" | "https");
+        let (rest, query) = match rest.split_once('?') {
+            Some((rest, query)) if is_http => (rest, Some(query)),
+            _ => (rest, None),
+        };
         let (host, key) = rest.split_once('/').unwrap_or((rest, ""));
         if host.is_empty() {
             return Err(invalid(format!("expected {scheme}://NAME/…, found no name of a bucket or host")));
         }
-        let is_http = matches!(scheme, "http" | "https");
-        if is_http && key.contains(['?', '#']) {
-            return Err(invalid("expected a URL without `?` and `#`".to_owned()));
+        if is_http && key.contains('#') {
+            return Err(invalid("expected a URL without `#`".to_owned()));
         }
         // Of HTTP the letters are encoded, of the others they stand as they are.
         let key = if is_http { Key::from_url_path(key) } else { Key::parse(key.trim_end_matches('/')) };
         let key = key.map_err(|error| invalid(error.to_string()))?;
-        Ok(Some(Self { store: store(scheme, host)?, key, lists: !is_http }))
+        Ok(Some(Self {
+            store: store(scheme, host, query)?,
+            key,
+            lists: !is_http,
+            has_query: query.is_some(),
+        }))
     }
 
     /// The object of a name in this one as a folder.
@@ -79,7 +90,7 @@ impl Object {
         }
         // Servers answer for folders too, with a page for people; so whatever has no ending may be one.
         let may_be_folder = is_root || !self.key.filename().is_some_and(|name| name.contains('.'));
-        if may_be_folder && !self.list(&MARKS)?.is_empty() {
+        if may_be_folder && !self.has_query && !self.list(&MARKS)?.is_empty() {
             return Ok(Found::Folder);
         }
         self.state().map(|(bytes, _)| Found::File(bytes))
@@ -87,6 +98,13 @@ impl Object {
 
     /// How many bytes it has, and what tells its state from another.
     pub(super) fn state(&self) -> io::Result<(u64, Option<String>)> {
+        if self.has_query {
+            // What was signed for GET is not for HEAD.
+            let options = GetOptions { range: Some((0..1).into()), ..GetOptions::default() };
+            if let Ok(answer) = wait(self.store.get_opts(&self.key, options)) {
+                return Ok((answer.meta.size, answer.meta.e_tag));
+            }
+        }
         let about = wait(self.store.head(&self.key))?;
         Ok((about.size, about.e_tag))
     }
@@ -193,10 +211,13 @@ fn send_parts(file: &mut fs::File, upload: &mut WriteMultipart) -> io::Result<()
     }
 }
 
-/// The store of a scheme and a bucket or host, made once.
-fn store(scheme: &'static str, host: &str) -> io::Result<Arc<dyn ObjectStore>> {
+/// The store of a scheme and a bucket or host, made once; over HTTP also of a query, which stands behind each of its URLs.
+fn store(scheme: &'static str, host: &str, query: Option<&str>) -> io::Result<Arc<dyn ObjectStore>> {
     static STORES: Mutex<Stores> = Mutex::new(BTreeMap::new());
-    let base = format!("{scheme}://{host}");
+    let base = match query {
+        Some(query) => format!("{scheme}://{host}/?{query}"),
+        None => format!("{scheme}://{host}"),
+    };
     let mut stores = STORES.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(store) = stores.get(&base) {
         return Ok(Arc::clone(store));

@@ -327,6 +327,71 @@ fn everything_that_has_a_path_may_have_a_url() {
 }
 
 #[test]
+fn a_signed_url_is_good_for_what_it_names() {
+    let folder = folder();
+    let at = folder.path();
+    let store = &Store::all()[2];
+    store.server.keep("bucket/signed/box1.mcap", fs::read(at.join("box1.mcap")).unwrap());
+    store.server.keep(
+        "bucket/signed/graph.g2o",
+        b"VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nEDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n".to_vec(),
+    );
+    store.server.sign("bucket/signed");
+    let signed = |name: &str| format!("{}?to=a/b&signature=right", store.url(&format!("signed/{name}")));
+    let words = store.failed(at, &["info", &store.url("signed/box1.mcap")]);
+    assert!(words.contains("403") || words.contains("not signed"), "{words}");
+    assert_eq!(
+        store.done(at, &["cat", &signed("box1.mcap"), "point_measurements", "--frame", "7"]),
+        store.done(at, &["cat", "box1.mcap", "point_measurements", "--frame", "7"])
+    );
+    // The first byte tells how long the file is; then only what is wanted.
+    let asked = store.server.asked();
+    assert!(asked.iter().all(|line| line.starts_with("GET") || !line.contains("signed/")), "{asked:?}");
+    // A signature is nobody's to keep.
+    store.done(at, &["import", &signed("graph.g2o"), "-o", "imported"]);
+    let manifest = fs::read_to_string(at.join("imported/sequence.json")).unwrap();
+    assert!(manifest.contains("\"graph\"") && !manifest.contains("signature"), "{manifest}");
+    // Servers that know no signatures do not mind.
+    store.server.keep("bucket/open.mcap", fs::read(at.join("box1.mcap")).unwrap());
+    assert!(store.done(at, &["info", &format!("{}?download=1", store.url("open.mcap"))]).contains("box1"));
+}
+
+#[test]
+fn folders_of_files_are_sent() {
+    let folder = folder();
+    let at = folder.path();
+    for store in Store::all() {
+        store.done(at, &["man", "-o", &store.url("man1")]);
+        let objects = store.server.objects();
+        assert!(
+            objects["bucket/man1/os.1"].starts_with(b".") && objects.contains_key("bucket/man1/os-adjust.1")
+        );
+        // What somebody else put there stays.
+        store.server.keep("bucket/man1/other.1", b"other".to_vec());
+        store.done(at, &["man", "-o", &store.url("man1")]);
+        assert!(store.server.objects().contains_key("bucket/man1/other.1"));
+
+        // Raw data, downloaded here and sent there.
+        store.server.keep("origin/poses.txt", b"0 0 0 0 0 0 0 1\n".to_vec());
+        let recipe = include_str!("../../sequences/hospital.toml");
+        let (camera, _) = recipe.split_once("[raw]").unwrap();
+        let place = format!("http://{}/origin/poses.txt", store.server.address);
+        let raw = format!("[raw]\nfolder = \".\"\n[[raw.files]]\nurls = [{place:?}]\nunpack = false\n");
+        fs::write(at.join("dataset.toml"), format!("{camera}{raw}")).unwrap();
+        let fetch = ["fetch", "dataset.toml", "-o", &store.url("raw/hospital")];
+        let said = store.done(at, &fetch);
+        assert!(said.contains(&format!("os-convert tartanair {}", store.url("raw/hospital"))), "{said}");
+        assert_eq!(store.server.objects()["bucket/raw/hospital/poses.txt"], b"0 0 0 0 0 0 0 1\n");
+        assert!(!at.join("hospital.download").exists());
+        if store.scheme != "http" {
+            // HTTP lists nothing, and this folder has no sequence in it that could be asked for.
+            assert!(store.failed(at, &fetch).contains("--force"));
+            store.done(at, &[&fetch[..], &["--force"]].concat());
+        }
+    }
+}
+
+#[test]
 fn a_benchmark_goes_on_where_it_was_cut_off() {
     let folder = folder();
     let at = folder.path();
@@ -380,7 +445,7 @@ fn what_cannot_be_had_is_said_in_a_line() {
     for (url, expected) in [
         ("http:///a.mcap", "no name of a bucket or host"),
         ("http://127.0.0.1:9/a.mcap", "127.0.0.1:9"),
-        ("http://localhost/a.mcap?signed=1", "without `?`"),
+        ("http://localhost/a.mcap#first", "without `#`"),
         ("s3://", "no name of a bucket or host"),
     ] {
         let words = store.failed(at, &["info", url]);

@@ -28,6 +28,7 @@ struct State {
     asked: Vec<String>,
     sent: u64,
     forbidden: Vec<String>,
+    signed: Vec<String>,
 }
 
 /// A store on threads of its own.
@@ -87,6 +88,11 @@ impl Server {
     /// Answers what begins so with 403.
     pub(crate) fn forbid(&self, prefix: &str) {
         self.state.lock().unwrap().forbidden.push(prefix.to_owned());
+    }
+
+    /// Gives what begins so to GET alone, and only with `signature=right`.
+    pub(crate) fn sign(&self, prefix: &str) {
+        self.state.lock().unwrap().signed.push(prefix.to_owned());
     }
 
     /// Keys and objects.
@@ -184,6 +190,11 @@ fn respond(request: &Request, kind: Kind, state: &mut State) -> Response {
     state.asked.push(format!("{} {key}", request.method));
     if state.forbidden.iter().any(|prefix| key.starts_with(prefix.as_str())) {
         return plain(403, "<Error><Code>AccessDenied</Code><Message>not yours</Message></Error>");
+    }
+    let is_right =
+        request.method == "GET" && request.query.get("signature").is_some_and(|found| found == "right");
+    if !is_right && state.signed.iter().any(|prefix| key.starts_with(prefix.as_str())) {
+        return plain(403, "not signed");
     }
     let asks = |name: &str| request.query.contains_key(name);
     let is_bucket = kind == Kind::Buckets && !key.contains('/');

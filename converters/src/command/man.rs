@@ -1,13 +1,12 @@
 //! `os-convert man`: man pages.
 
-use std::fs;
 use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::Context as _;
 
 use super::Outcome;
-use open_structure::storage::on_this_machine;
+use open_structure::storage::Outgoing;
 
 /// Write man pages: one for the program and one for each dataset
 #[derive(clap::Args, Debug)]
@@ -29,8 +28,8 @@ pub fn run(args: &Args, mut program: clap::Command, stdout: &mut dyn Write) -> a
         stdout.write_all(&page)?;
         return Ok(Outcome::Done);
     };
-    on_this_machine(folder).with_context(|| format!("{}", folder.display()))?;
-    fs::create_dir_all(folder).with_context(|| format!("{}", folder.display()))?;
-    clap_mangen::generate_to(program, folder).with_context(|| format!("{}", folder.display()))?;
+    let pages = Outgoing::folder(folder).with_context(|| format!("{}", folder.display()))?;
+    clap_mangen::generate_to(program, pages.path()).with_context(|| format!("{}", folder.display()))?;
+    pages.finish().with_context(|| format!("{}", folder.display()))?;
     Ok(Outcome::Done)
 }

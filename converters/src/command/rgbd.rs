@@ -13,7 +13,7 @@ use clap::builder::PossibleValuesParser;
 use open_structure::datasets::{self, CameraOfDataset, Dataset, Recipe};
 use open_structure::format::{self, Encoding, WriteOptions};
 use open_structure::simulate::noise::{NoiseModel, NoiseRecipe};
-use open_structure::storage::{self, File};
+use open_structure::storage::{self, File, Outgoing};
 use serde::Serialize;
 use std::io::{Read as _, Write};
 use std::ops::Range;
@@ -276,7 +276,7 @@ pub fn run(
         raw.source.citation = Some(recipe.citation);
     } else if matches!(unpacked, Input::Archive(_)) && raw.name.ends_with(".partial") {
         // The archive has no folder: its own name has to do.
-        let stem = input.file_name().unwrap_or_default().to_string_lossy();
+        let stem = storage::without_query(input).file_name().unwrap_or_default().to_string_lossy();
         stem.split('.').next().unwrap_or_default().clone_into(&mut raw.name);
     }
     let name = args.name.clone().unwrap_or_else(|| raw.name.clone());
@@ -324,18 +324,16 @@ fn pictures(
     count: usize,
     progress: &generate::Progress<'_>,
 ) -> anyhow::Result<()> {
-    storage::on_this_machine(folder)
-        .and_then(std::fs::create_dir_all)
-        .with_context(|| folder.display().to_string())?;
+    let drawn = Outgoing::folder(folder).with_context(|| folder.display().to_string())?;
     let frames = generated.frames();
     let count = count.min(frames.len());
     for number in 0..count {
         let index = number * frames.len() / count;
-        let path = folder.join(format!("{:06}.png", frames[index].frame_id.0));
+        let path = drawn.path().join(format!("{:06}.png", frames[index].frame_id.0));
         generate::overlay(raw, generated, options, index, &path)?;
         progress("drawing", number as u64 + 1, count as u64);
     }
-    Ok(())
+    drawn.finish().with_context(|| folder.display().to_string())
 }
 
 /// What is said about a converted sequence.

@@ -133,7 +133,8 @@ fn read(path: &Path) -> Result<Soup, Error> {
         return Err(content(None, "a mesh of at most 2 GiB", format!("{bytes} bytes")));
     }
     let mut reader = BufReader::new(File::open(path).map_err(io)?.take(MAX_BYTES));
-    let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+    let extension =
+        storage::without_query(path).extension().map(|extension| extension.to_string_lossy().to_lowercase());
     match extension.as_deref() {
         Some("obj") => read_obj(&mut reader).map_err(|found| content(None, "an OBJ file", found)),
         Some("ply") => read_ply(reader).map_err(|(line, found)| content(line, "a PLY file", found)),

@@ -170,6 +170,47 @@ fn a_foreign_estimate_stands_beside_the_methods() {
 }
 
 #[test]
+fn methods_get_the_very_measurements_that_estimates_were_made_of() {
+    let folder = folder();
+    let at = folder.path();
+    ended(at, &["simulate", "short.toml", "-o", "short"], 0);
+    ended(at, &["measure", "short", "-o", "noisy", "--noise", "kinect-disparity", "--seeds", "3..4"], 0);
+    for seed in ["3", "4"] {
+        let (noisy, tracked) = (format!("noisy-{seed}"), format!("tracked-{seed}"));
+        let found = os(at, &["track", &noisy, "-o", &tracked, "--name", "theirs"]);
+        assert!(matches!(found.status.code(), Some(0 | 3)), "{found:?}");
+    }
+    let of = ["tracked-3", "tracked-4", "--estimates", "theirs", "--methods", "map-to-frame", "--no-bound"];
+    let run = |more: &[&str]| {
+        let output = os(at, &[&["benchmark"], &of[..], &["--seeds", "1", "--json"], more].concat());
+        assert!(output.status.success(), "{output:?}");
+        let rows: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let found = |sequence: &str, method: &str, column: &str| {
+            let of = |row: &&Value| row["sequence"] == sequence && row["method"] == method;
+            rows.as_array().unwrap().iter().find(of).unwrap()[column].as_f64()
+        };
+        // Two sequences of one name are told apart by those of their folders.
+        let error = |sequence: &str, method: &str| found(sequence, method, "ape_rmse_cm").unwrap();
+        assert_eq!(found("tracked-3", "theirs", "seconds"), None, "an estimate took its time elsewhere");
+        let pairs = ["tracked-3", "tracked-4"]
+            .map(|sequence| (error(sequence, "theirs"), error(sequence, "map-to-frame")));
+        (pairs, String::from_utf8(output.stderr).unwrap())
+    };
+    let (pairs, words) = run(&["-o", "same", "--as-measured"]);
+    assert!(pairs.iter().all(|(theirs, ours)| (theirs - ours).abs() < 1e-6 * ours), "{pairs:?}");
+    assert!(pairs[0] != pairs[1] && !words.contains("warning"), "{words}");
+    let (drawn, words) = run(&["-o", "drawn"]);
+    assert!(drawn.iter().all(|(theirs, ours)| (theirs - ours).abs() > 1e-3 * ours), "{drawn:?}");
+    assert!(words.contains("tracked-3: its estimates were made of its own measurements"), "{words}");
+    ended(at, &[&["benchmark"], &of[..], &["-o", "drawn", "--as-measured"]].concat(), 1);
+    ended(
+        at,
+        &[&["benchmark"], &of[..], &["-o", "x", "--as-measured", "--noise", "first-release"]].concat(),
+        2,
+    );
+}
+
+#[test]
 fn a_sequence_that_has_changed_is_run_anew() {
     let folder = folder();
     let at = folder.path();

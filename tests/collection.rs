@@ -127,6 +127,9 @@ fn a_sequence_that_cannot_be_read_is_named_and_the_catalogue_stays() {
     let words = ended(at, &["index", "all", "--force"], 1);
     assert!(words.contains("sequence b 2") && words.contains("frames.parquet"), "{words}");
     assert!(fs::read(at.join("all/catalogue.parquet")).unwrap() == before);
+    fs::remove_file(&frames).unwrap();
+    let words = ended(at, &["index", "all", "--force"], 1);
+    assert!(words.contains("sequence b 2") && words.contains("frames.parquet"), "{words}");
     let hidden = |entry: &fs::DirEntry| entry.file_name().to_string_lossy().starts_with('.');
     let left = fs::read_dir(at.join("all")).unwrap().filter(|entry| hidden(entry.as_ref().unwrap()));
     assert_eq!(left.count(), 0, "something was left behind");

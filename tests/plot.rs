@@ -405,6 +405,11 @@ fn what_keeps_a_figure_from_being_made_is_said_and_leaves_nothing_behind() {
         (&["ape", "blind.mcap", "-o", "a.pdf"], 1, "blind.mcap: expected true poses to compare with"),
         (&["scene", "nowhere", "-o", "a.pdf"], 1, "nowhere"),
         (
+            &["apes", "both.mcap", "-o", "a.pdf"],
+            2,
+            "apes: neither a figure nor a sequence; figures are scene, ",
+        ),
+        (
             &["ape", "both.mcap", "-o", "a.pdf", "--estimate", "ours"],
             1,
             "expected an estimate ours, found mine, theirs",

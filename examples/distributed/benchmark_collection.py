@@ -17,6 +17,7 @@ made twice.
 """
 
 import argparse
+import json
 import shlex
 import subprocess
 import sys
@@ -51,7 +52,11 @@ def folder_name(sequence: str) -> str:
 def read_jobs(path: Path, collection: Path, program: str) -> list[Job]:
     """One job a line: the name of the sequence, then the command, in which {output} is where it writes."""
     jobs = []
-    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        sys.exit(f"{path}: {error.strerror}")
+    for number, line in enumerate(text.splitlines(), 1):
         words = shlex.split(line, comments=True)
         if not words:
             continue
@@ -72,16 +77,20 @@ def run(command: list[str] | tuple[str, ...], permitted: tuple[int, ...] = (0,))
     return done.stdout
 
 
-def make(job: Job) -> Job:
-    """Makes a sequence that is not there yet."""
+def make(job: Job, program: str) -> Job:
+    """Makes a sequence that is not there yet, of the name that the collection wants."""
     output = Path(job.output)
     if not output.exists():
         try:
-            run(job.command)
+            # Findings (3) are told in the sequence itself.
+            run(job.command, permitted=(0, 3))
         except TaskFailed:
             # The attempt of a worker that was given up may have come to its end meanwhile.
             if not output.exists():
                 raise
+    found = json.loads(run((program, "cat", job.output, "manifest")))["name"]
+    if found != job.name:
+        raise TaskFailed(f"{output}: expected a sequence called {job.name!r}, found {found!r}; name it so where it is made")
     return job
 
 
@@ -130,6 +139,8 @@ def main() -> None:
     for folder in sorted(collection.glob("sequence=*")):
         if str(folder) not in there:
             jobs.append(Job(unquote(folder.name.removeprefix("sequence=")), str(folder)))
+    if not jobs:
+        sys.exit(f"{collection}: no sequences; expected folders called sequence=NAME, or --jobs")
 
     cluster = None
     if not arguments.scheduler:
@@ -140,7 +151,7 @@ def main() -> None:
         futures = {}
         for job in jobs:
             tries = {"retries": arguments.retries}
-            made = client.submit(make, job, key=f"make-{job.name}", **tries) if job.command else job
+            made = client.submit(make, job, program, key=f"make-{job.name}", **tries) if job.command else job
             futures[job.name] = client.submit(
                 benchmark, made, program, str(runs), options, key=f"benchmark-{job.name}", **tries
             )

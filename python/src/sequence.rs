@@ -212,6 +212,10 @@ impl Sequence {
         Ok(Frames::new(slf.unbind(), rows.into_iter().map(|frame| frame.frame_id).collect()))
     }
 
+    fn __contains__(&self, table: &str) -> bool {
+        self.tables().contains(&table)
+    }
+
     fn __len__(&self, py: Python<'_>) -> PyResult<usize> {
         Ok(self.frame_list(py)?.len())
     }

@@ -25,6 +25,8 @@ def test_what_is_said_of_a_sequence(stored: str, request: pytest.FixtureRequest)
     assert sequence.summary is None
     assert sequence.estimates == sequence.graphs == []
     assert sequence.tables[0] == "frames"
+    assert "point_measurements" in sequence
+    assert "graph_poses" not in sequence
     assert repr(sequence) == f"<Sequence sphere2 at {path}>"
 
 

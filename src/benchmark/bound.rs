@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 use nalgebra::{Point2, Point3};
 use serde::{Deserialize, Serialize};
 
+use super::measured::given;
 use super::run::adjust_options;
-use super::{Error, Method, Plan, Progress, Store, measured};
+use super::{Error, Method, Plan, Progress, Store};
 use crate::adjust;
 use crate::covisibility::{GraphOptions, reprojection_graph};
 use crate::geometry::{PinholeCamera, Pose, triangulate_point};
@@ -44,7 +45,7 @@ pub(super) fn bounds(
         return Ok(());
     }
     let seed = plan.seeds.first().copied().unwrap_or(0);
-    let sequence = measured(sequence, &plan.noise, seed);
+    let sequence = given(sequence, plan, seed);
     let mut found = BTreeMap::new();
     let mut bounds: BTreeMap<Method, Option<Bound>> = BTreeMap::new();
     for method in &methods {
@@ -134,7 +135,7 @@ fn graph(sequence: &Sequence) -> Result<FactorGraph, String> {
 /// For a method whose scale is free, after Sim(3) alignment; for the others after SE(3) alignment. Groups count as far as their lines
 /// are parallel as they were measured.
 ///
-/// * `sequence` — measurements as of [`measured`]; true poses and landmarks.
+/// * `sequence` — measurements as a plan gives them; true poses and landmarks.
 ///
 /// # Errors
 /// In words, where no graph can be built, or the measurements leave something open.

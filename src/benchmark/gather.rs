@@ -81,7 +81,7 @@ fn agree(part: &Part, first: &Plan, first_folder: &Path) -> Result<(), Error> {
     let same = [
         ("choice of methods", part.plan.methods == first.methods),
         ("choice of estimates", part.plan.estimates == first.estimates),
-        ("noise", part.plan.noise == first.noise),
+        ("noise", (&part.plan.noise, part.plan.as_measured) == (&first.noise, first.as_measured)),
         ("choice of a bound", part.plan.bound == first.bound),
     ];
     let Some((what, _)) = same.into_iter().find(|(_, same)| !same) else { return Ok(()) };

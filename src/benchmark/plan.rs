@@ -16,6 +16,10 @@ pub struct Plan {
     pub seeds: Vec<u64>,
     /// Noise for what the sequence has without noise, and for depths that it has not at all.
     pub noise: NoiseRecipe,
+    /// Whether methods get the measurements as they stand in the sequences: then nothing is drawn, and a seed is that of the
+    /// methods alone.
+    #[serde(default)]
+    pub as_measured: bool,
     /// Whether the bound is computed.
     pub bound: bool,
 }

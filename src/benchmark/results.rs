@@ -153,7 +153,8 @@ fn row(sequence: &str, method: &str, cells: &[Cell], bound: Option<&Bound>) -> R
             })
             .max()
             .unwrap_or(0),
-        seconds: Spread::of(cells.iter().map(|cell| cell.seconds)),
+        // What came with a sequence took its time elsewhere.
+        seconds: Method::of_name(method).and_then(|_| Spread::of(cells.iter().map(|cell| cell.seconds))),
         bound_cm: bound.map(|bound| bound.translation_rms_m * 100.0),
         bound_is_scaled: bound.is_some_and(|bound| bound.is_scaled),
         paper: in_paper.and_then(|name| paper(sequence, PaperMethod(name))).cloned(),

@@ -1,17 +1,20 @@
 //! Makes the cells of a plan, on both cores, and keeps each when it is done.
 
 use std::collections::BTreeSet;
+use std::path::Path;
 use std::time::Instant;
 
 use rayon::prelude::*;
 
 use super::bound::bounds;
 use super::content::Content;
-use super::{Cell, CellKey, CurvePoint, Error, Method, Outcome, Plan, Store, load, measured};
+use super::measured::given;
+use super::{Cell, CellKey, CurvePoint, Error, Method, Outcome, Plan, Store, load};
 use crate::adjust;
 use crate::covisibility::{GraphOptions, reprojection_graph};
 use crate::evaluate::{Alignment, Step, absolute, relative};
 use crate::geometry::Pose;
+use crate::storage;
 use crate::structure::{Estimate, FrameId, MeasuredFrame, MeasurementNoise, Sequence, registry};
 use crate::track::{self, TrackOptions};
 
@@ -24,6 +27,11 @@ pub enum Progress<'a> {
         sequence: &'a str,
         /// Why.
         reason: &'a str,
+    },
+    /// Estimates of a sequence were made of its own measurements, and methods are given others.
+    OtherMeasurements {
+        /// Name of the sequence.
+        sequence: &'a str,
     },
     /// A sequence is not the one that stored cells were made of: they are made anew.
     Changed {
@@ -60,7 +68,8 @@ struct Case {
 /// * `tell` — told of what is done, from any thread.
 ///
 /// Units of one sequence and one seed run side by side; their figures do not depend on how many do. A sequence without true
-/// poses is left out and told. Gives the names of the sequences in the order given.
+/// poses is left out and told. Gives the names of the sequences in the order given: those in their manifests, or where several
+/// are called the same, such as one with several noises, those of their files.
 ///
 /// # Errors
 /// Those of [`load`] and of the store, [`Error::SameName`]; the first of them ends the run, and what is done is kept.
@@ -71,14 +80,9 @@ pub fn run(
     tell: &(dyn Fn(&Progress<'_>) + Sync),
 ) -> Result<Vec<String>, Error> {
     let mut cases = Vec::new();
-    let mut known = BTreeSet::new();
     let mut kept = Vec::new();
-    for name in names {
-        let sequence = load(name)?;
+    for sequence in loaded(names)? {
         let title = sequence.manifest.name.clone();
-        if !known.insert(title.clone()) {
-            return Err(Error::SameName { name: title });
-        }
         let truth: Vec<(FrameId, Pose)> = sequence
             .frames
             .iter()
@@ -91,6 +95,12 @@ pub fn run(
             _ => {
                 if store.expect(&title, &Content::of(&sequence, &plan.estimates))? {
                     tell(&Progress::Changed { sequence: &title });
+                }
+                let has_own =
+                    !sequence.point_measurements.is_empty() || !sequence.line_measurements.is_empty();
+                let draws = !sequence.point_observations.is_empty() || !sequence.line_observations.is_empty();
+                if has_own && draws && !plan.estimates.is_empty() && !plan.as_measured {
+                    tell(&Progress::OtherMeasurements { sequence: &title });
                 }
                 kept.push(title);
                 cases.push(Case { sequence, truth });
@@ -124,6 +134,25 @@ pub fn run(
     Ok(kept)
 }
 
+/// The sequences of some names, each with a name of its own.
+fn loaded(names: &[String]) -> Result<Vec<Sequence>, Error> {
+    let mut sequences = names.iter().map(|name| load(name)).collect::<Result<Vec<_>, _>>()?;
+    let titles: Vec<String> = sequences.iter().map(|sequence| sequence.manifest.name.clone()).collect();
+    let mut known = BTreeSet::new();
+    for ((sequence, title), name) in sequences.iter_mut().zip(&titles).zip(names) {
+        if titles.iter().filter(|other| *other == title).count() > 1 {
+            let place = storage::without_query(Path::new(name));
+            let stem = if storage::is_folder(place) { place.file_name() } else { place.file_stem() };
+            sequence.manifest.name =
+                stem.map_or_else(|| title.clone(), |stem| stem.to_string_lossy().into_owned());
+        }
+        if !known.insert(sequence.manifest.name.clone()) {
+            return Err(Error::SameName { name: sequence.manifest.name.clone() });
+        }
+    }
+    Ok(sequences)
+}
+
 /// All methods of a plan on one sequence with one seed.
 fn seeded(case: &Case, plan: &Plan, seed: u64, store: &Store) -> Result<(), Error> {
     let title = &case.sequence.manifest.name;
@@ -148,7 +177,7 @@ fn seeded(case: &Case, plan: &Plan, seed: u64, store: &Store) -> Result<(), Erro
     if wanted.is_empty() {
         return Ok(());
     }
-    let sequence = measured(&case.sequence, &plan.noise, seed);
+    let sequence = given(&case.sequence, plan, seed);
     let given = Given {
         frames: MeasuredFrame::of(&sequence),
         noise: MeasurementNoise::declared(&sequence.manifest),

@@ -75,7 +75,11 @@ impl Store {
                 Some(stored) if stored.version != version => {
                     Some(format!("of version {}, this is {version}", stored.version))
                 }
-                Some(stored) if stored.plan.noise != plan.noise => Some("of other noise".to_owned()),
+                Some(stored)
+                    if (&stored.plan.noise, stored.plan.as_measured) != (&plan.noise, plan.as_measured) =>
+                {
+                    Some("of other noise".to_owned())
+                }
                 _ => None,
             };
             if let Some(difference) = difference {

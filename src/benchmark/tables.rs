@@ -89,7 +89,12 @@ pub fn cells_table(results: &Results) -> ResultTable {
                 Outcome::Failed { .. } => None,
             }),
         )
-        .number("seconds", "s", "wall time of the method alone", cells.iter().map(|cell| Some(cell.seconds)))
+        .number(
+            "seconds",
+            "s",
+            "wall time of the method alone",
+            cells.iter().map(|cell| Method::of_name(&cell.key.method).map(|_| cell.seconds)),
+        )
         .text("failed", "why there is no estimate", reason)
 }
 

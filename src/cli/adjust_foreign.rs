@@ -228,5 +228,5 @@ fn into_file(
     output.flush()?;
     drop(output);
     partial.finish()?;
-    Ok(text::bytes(storage::size(path)))
+    Ok(text::bytes(storage::size(path, &[])))
 }

@@ -23,7 +23,7 @@ const MOST_SEEDS: u64 = 1000;
 /// Run methods on sequences over seeds: the paper's table, with the bound and the paper's figures beside it.
 ///
 /// Where a sequence has noise-free observations, measurements are drawn from them with each seed; noisy measurements stay as
-/// published, and depths that they lack are drawn about the true ones. Trackers are given measurements and the first true pose.
+/// published, and depths that they lack are drawn about the true ones. `--as-measured` takes measurements as they are. Trackers are given measurements and the first true pose.
 /// Optimisers begin with the robust map-to-frame estimate.
 ///
 /// A run that is cut off goes on where it ended: the same command again. Every cell is a file of its own in the folder; tables
@@ -39,7 +39,7 @@ Examples:
   os benchmark box1 corridor1 -o results
   os benchmark all -o results            every sequence of a collection
   os benchmark converted/* -o results --seeds 10 --label \"2026-11-22, commit 3120c7e\"
-  os benchmark box1.mcap -o results --methods map-to-frame,structural-ba --estimates my-slam
+  os benchmark box1.mcap -o results --methods map-to-frame,structural-ba --estimates my-slam --as-measured
   os benchmark --gather runs/* -o results   what runs on several machines found, as one table")]
 #[expect(clippy::struct_excessive_bools, reason = "each is a switch of its own")]
 pub(super) struct Args {
@@ -50,7 +50,7 @@ pub(super) struct Args {
     #[arg(short, long, value_name = "FOLDER")]
     output: PathBuf,
     /// Run nothing: the arguments are folders of results, whose sequences and seeds are put together as if one run had made them.
-    #[arg(long, conflicts_with_all = ["methods", "estimates", "seeds", "noise", "set", "no_bound", "threads"])]
+    #[arg(long, conflicts_with_all = ["methods", "estimates", "seeds", "noise", "set", "as_measured", "no_bound", "threads"])]
     gather: bool,
     /// Methods, in the order of the columns; all by default.
     #[arg(long, value_name = "METHOD", value_delimiter = ',', value_parser = PossibleValuesParser::new(Method::ALL.map(Method::name)))]
@@ -67,6 +67,10 @@ pub(super) struct Args {
     /// A parameter of the noise model or an option, by the registry's name; may be given several times.
     #[arg(long, value_name = "NAME=VALUE", value_parser = super::measure::assignment)]
     set: Vec<(String, f64)>,
+    /// Give the methods the measurements as they stand in the sequences, as `--estimates` had them, and draw none; a seed is then
+    /// that of the methods alone.
+    #[arg(long, conflicts_with_all = ["noise", "set"])]
+    as_measured: bool,
     /// Leave out the bound, which takes about as long as one adjustment.
     #[arg(long)]
     no_bound: bool,
@@ -125,7 +129,14 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         methods.extend(Method::ALL);
     }
     let seeds = args.seeds.clone().collect();
-    let plan = Plan { methods, estimates: args.estimates.clone(), seeds, noise, bound: !args.no_bound };
+    let plan = Plan {
+        methods,
+        estimates: args.estimates.clone(),
+        seeds,
+        noise,
+        as_measured: args.as_measured,
+        bound: !args.no_bound,
+    };
     let store = Store::open(&args.output, &plan, args.force)?;
     let names = inputs::named(&args.sequences)?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads.unwrap_or(0)).build()?;
@@ -140,6 +151,12 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
             let _ = writeln!(
                 io::stderr(),
                 "{sequence}: is another than its cells were made of; they are made anew"
+            );
+        }
+        benchmark::Progress::OtherMeasurements { sequence } => {
+            let _ = writeln!(
+                io::stderr(),
+                "warning: {sequence}: its estimates were made of its own measurements, and the methods are given others; --as-measured gives them the same"
             );
         }
         benchmark::Progress::LeftOut { sequence, reason } => {

@@ -118,7 +118,9 @@ fn print<R: Record>(args: &Args, reader: &SequenceReader, stdout: &mut dyn Write
 /// The rows of a frame: through the index for per-frame tables, by looking at all rows for the others.
 fn rows_of_frame<R: Record>(reader: &SequenceReader, frame_id: FrameId) -> anyhow::Result<Option<Vec<R>>> {
     if R::TABLE.storage == Storage::PerFrame {
-        let Some(bundle) = reader.frame(frame_id)? else { return Ok(None) };
+        let Some(bundle) = reader.frame_of(frame_id, &|table| table == R::TABLE.name)? else {
+            return Ok(None);
+        };
         let sequence = Sequence {
             point_observations: bundle.point_observations,
             line_observations: bundle.line_observations,

@@ -65,7 +65,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         args.output.display(),
         text::count(rows),
         written.tables.len(),
-        text::bytes(storage::size(&args.output))
+        text::bytes(format::stored_bytes(&args.output))
     )?;
     Ok(outcome)
 }

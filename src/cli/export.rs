@@ -124,7 +124,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
             outcome = Outcome::Findings;
         }
     }
-    let size = text::bytes(storage::size(&args.output));
+    let size = text::bytes(storage::size(&args.output, &[]));
     writeln!(stdout, "{}: {what}, {size}", args.output.display())?;
     Ok(outcome)
 }

@@ -35,5 +35,5 @@ pub(super) fn write(output: &Path, mut sequence: Sequence, force: bool) -> anyho
     registry::SPEC_VERSION.clone_into(&mut sequence.manifest.spec_version);
     sequence.manifest.tables.clear();
     format::write(output, &sequence, WriteOptions { force, ..WriteOptions::default() })?;
-    Ok(text::bytes(storage::size(output)))
+    Ok(text::bytes(format::stored_bytes(output)))
 }

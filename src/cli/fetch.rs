@@ -140,7 +140,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     if let Some(note) = note {
         writeln!(stdout, "Note: {note}")?;
     }
-    writeln!(stdout, "{}: {}", fetched.into.display(), text::bytes(storage::size(&fetched.into)))?;
+    writeln!(stdout, "{}: {}", fetched.into.display(), text::bytes(storage::size(&fetched.into, &[])))?;
     writeln!(stdout, "next: {}", next.join(" "))?;
     Ok(Outcome::Done)
 }

@@ -96,7 +96,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         count(sequence.graph_points.len()),
         count(sequence.graph_factors.len()),
         args.graph,
-        text::bytes(storage::size(&args.output))
+        text::bytes(format::stored_bytes(&args.output))
     )?;
     Ok(outcome)
 }

@@ -8,7 +8,6 @@ use serde::Serialize;
 
 use super::{Outcome, inputs, text};
 use crate::format::{self, SequenceReader};
-use crate::storage;
 use crate::structure::{Camera, Frame, Manifest, Noise, TrajectoryPose};
 
 /// Show what is in a sequence: origin, cameras, frames, tables, noise, what was recovered or left out.
@@ -75,7 +74,7 @@ fn info<'a>(reader: &'a SequenceReader, frames: &[Frame]) -> anyhow::Result<Info
     Ok(Info {
         path: reader.path().display().to_string(),
         encoding: reader.encoding().name(),
-        bytes: storage::size(reader.path()),
+        bytes: format::stored_bytes(reader.path()),
         frame_count: frames.len(),
         frames_with_truth: frames.iter().filter(|frame| frame.world_from_camera().is_some()).count(),
         duration_seconds: span as f64 * 1e-9,

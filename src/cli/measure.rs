@@ -203,7 +203,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
             path.display(),
             text::count(points),
             text::count(lines),
-            text::bytes(storage::size(path))
+            text::bytes(format::stored_bytes(path))
         )?;
     }
     Ok(outcome)
@@ -235,7 +235,7 @@ fn complete_depths(
             text::count(done.line_ends as u64),
             text::count(done.triangulated as u64),
             text::count(done.without as u64),
-            text::bytes(storage::size(path))
+            text::bytes(format::stored_bytes(path))
         )?;
         if done.without > 0 {
             outcome = Outcome::Findings;

@@ -5,6 +5,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
+use clap::ValueEnum as _;
 use clap::error::ErrorKind;
 use nalgebra::Point3;
 
@@ -213,6 +214,15 @@ impl Args {
             (None, Some(figure), [first]) if !storage::exists(first) => {
                 let words = format!("{}: expected a sequence after the figure's name", figure.name());
                 program().error(ErrorKind::MissingRequiredArgument, words).exit()
+            }
+            (None, None, [first, _, ..]) if !storage::exists(first) && first.extension().is_none() => {
+                let known = Figure::value_variants().iter().map(|figure| figure.name()).collect::<Vec<_>>();
+                let words = format!(
+                    "{}: neither a figure nor a sequence; figures are {}",
+                    first.display(),
+                    known.join(", ")
+                );
+                program().error(ErrorKind::InvalidValue, words).exit()
             }
             (None, _, inputs) => (Figure::Scene, inputs),
         }

@@ -56,7 +56,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     drop(stages);
     fs::write(partial.path(), report.html()?).with_context(|| output.display().to_string())?;
     partial.finish()?;
-    let size = storage::size(output);
+    let size = storage::size(output, &[]);
     writeln!(stdout, "{}: {}", output.display(), text::bytes(size))?;
     Ok(if report.has_findings() { Outcome::Findings } else { Outcome::Done })
 }

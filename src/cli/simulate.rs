@@ -7,7 +7,7 @@ use anyhow::Context;
 
 use super::progress::{Progress, Stages};
 use super::{Outcome, render, text};
-use crate::format::{Encoding, Outline, WriteOptions, Written, write_two_pass};
+use crate::format::{Encoding, Outline, WriteOptions, Written, stored_bytes, write_two_pass};
 use crate::simulate::{self, Expected, Simulation};
 use crate::stations;
 use crate::storage;
@@ -90,12 +90,12 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         text::count(found.point_observations),
         text::count(found.line_observations),
         text::count(rows),
-        text::bytes(storage::size(output))
+        text::bytes(stored_bytes(output))
     )?;
     if let Some((raw, (partial, rendered))) = raw.zip(rendered) {
         partial.finish()?;
         let (width, height) = (rendered.width, rendered.height);
-        let (frames, size) = (text::count(rendered.frames as u64), text::bytes(storage::size(raw)));
+        let (frames, size) = (text::count(rendered.frames as u64), text::bytes(storage::size(raw, &[])));
         writeln!(
             stdout,
             "{}: pictures and depth maps of {frames} frames, {width} x {height} px, {size}",

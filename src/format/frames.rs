@@ -10,11 +10,11 @@ use crate::structure::{
     Record, for_each_frame_table,
 };
 
-/// Topics of the per-frame tables.
-pub(super) fn frame_topics() -> Vec<String> {
+/// Topics of the per-frame tables that are wanted, by name.
+pub(super) fn frame_topics(wanted: &dyn Fn(&str) -> bool) -> Vec<String> {
     let mut topics = Vec::new();
     macro_rules! each {
-        ($($name:ident: $row:ident,)+) => { $(topics.push($row::TABLE.topic());)+ };
+        ($($name:ident: $row:ident,)+) => { $(if wanted($row::TABLE.name) { topics.push($row::TABLE.topic()); })+ };
     }
     for_each_frame_table!(each);
     topics

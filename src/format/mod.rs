@@ -56,7 +56,7 @@ pub(crate) use mcap_survey::{Faults, McapSurvey, survey_file};
 #[cfg(feature = "cli")]
 pub(crate) use partial::Partial;
 pub use partial::discard_unfinished;
-pub use reader::{SequenceReader, open, read};
+pub use reader::{SequenceReader, open, read, stored_bytes};
 pub use record_batches::RecordBatches;
 pub use rerun::{RerunCounts, write_rerun};
 pub use results::{read_results, results_batch, write_results, write_text};

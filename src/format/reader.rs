@@ -62,6 +62,20 @@ pub fn open(path: impl AsRef<Path>) -> Result<SequenceReader, Error> {
     SequenceReader::open(path.as_ref())
 }
 
+/// Bytes of a sequence as it is stored; 0 where there is none.
+#[must_use]
+pub fn stored_bytes(path: &Path) -> u64 {
+    let tables = table_files();
+    let mut known: Vec<&str> = tables.iter().map(String::as_str).collect();
+    known.extend([names::MANIFEST_FILE, names::CROISSANT_FILE]);
+    storage::size(path, &known)
+}
+
+/// Names of the files that the tables of a Parquet folder have.
+fn table_files() -> Vec<String> {
+    TABLES.iter().map(|table| format!("{}.parquet", table.name)).collect()
+}
+
 /// Reads a whole sequence into memory.
 ///
 /// # Errors
@@ -317,6 +331,20 @@ impl SequenceReader {
     /// # Errors
     /// As [`table`](Self::table).
     pub fn frame(&self, frame_id: FrameId) -> Result<Option<FrameBundle>, Error> {
+        self.frame_of(frame_id, &|_| true)
+    }
+
+    /// One frame with its rows in some tables; those of the others are neither read nor there.
+    ///
+    /// * `wanted` — whether a table of that name is.
+    ///
+    /// # Errors
+    /// As [`table`](Self::table).
+    pub fn frame_of(
+        &self,
+        frame_id: FrameId,
+        wanted: &dyn Fn(&str) -> bool,
+    ) -> Result<Option<FrameBundle>, Error> {
         let frames = self.frame_list()?;
         // Ascending in a conforming file; another one is searched through.
         let found = match frames.binary_search_by_key(&frame_id, |frame| frame.frame_id) {
@@ -329,7 +357,7 @@ impl SequenceReader {
             Backend::Mcap(reader) => {
                 let stamp = u64::try_from(bundle.frame.stamp_nanos).unwrap_or(0);
                 let mut ready = BTreeMap::new();
-                for message in reader.messages(frame_topics(), Some((stamp, stamp)))? {
+                for message in reader.messages(frame_topics(wanted), Some((stamp, stamp)))? {
                     take_into(reader, message?, &mut ready)?;
                 }
                 if let Some(rows) = ready.remove(&frame_id) {
@@ -340,7 +368,8 @@ impl SequenceReader {
                 macro_rules! each {
                     ($($name:ident: $row:ident,)+) => {
                         $(
-                            if let Some(table) = tables.get(stringify!($name)) {
+                            let name = stringify!($name);
+                            if let Some(table) = tables.get(name).filter(|_| wanted(name)) {
                                 let mut batches = table.batches_of_frame::<$row>(frame_id)?;
                                 while let Some(rows) = batches.next_rows::<$row>() {
                                     bundle.$name.extend(rows?.into_iter().filter(|row| row.frame_id == frame_id));
@@ -388,8 +417,10 @@ impl SequenceReader {
         let source = match &self.backend {
             Backend::Mcap(reader) => {
                 let bound = |stamp: i64| u64::try_from(stamp).unwrap_or(0);
-                let messages =
-                    reader.messages(frame_topics(), Some((bound(*stamps.start()), bound(*stamps.end()))))?;
+                let messages = reader.messages(
+                    frame_topics(&|_| true),
+                    Some((bound(*stamps.start()), bound(*stamps.end()))),
+                )?;
                 FrameSource::Mcap {
                     reader,
                     messages: Box::new(messages),
@@ -457,7 +488,7 @@ fn parse_manifest(path: &Path) -> Result<Manifest, Error> {
 
 fn open_tables(path: &Path, bytes_read: &Arc<AtomicU64>) -> Result<OpenedTables, Error> {
     let (mut tables, mut passed_over, mut damaged) = (BTreeMap::new(), Vec::new(), Vec::new());
-    let tables_known: Vec<String> = TABLES.iter().map(|table| format!("{}.parquet", table.name)).collect();
+    let tables_known = table_files();
     let known: Vec<&str> = tables_known.iter().map(String::as_str).collect();
     for entry in storage::list(path, &known).map_err(Error::io(path))? {
         let name = entry.name.to_string_lossy();

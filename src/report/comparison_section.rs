@@ -313,7 +313,9 @@ pub(super) fn convergence(runs: &[Run], title: &str) -> Markup {
             .iter()
             .map(|(_, run)| {
                 let costs = run.accepted();
-                let lowest = costs.iter().copied().fold(f64::INFINITY, f64::min);
+                // Where the cost rises, another problem begins, and the costs of the last one are what counts.
+                let last = (1..costs.len()).rev().find(|step| costs[*step] > costs[*step - 1]).unwrap_or(0);
+                let lowest = costs[last..].iter().copied().fold(f64::INFINITY, f64::min);
                 // The lowest itself has no place over powers of ten.
                 let number = |cost: f64| if lowered { cost - lowest } else { cost };
                 (0..).map(f64::from).zip(costs).map(|(step, cost)| [step, number(cost)]).collect()
@@ -352,7 +354,7 @@ pub(super) fn convergence(runs: &[Run], title: &str) -> Markup {
         },
         Figure {
             title: above,
-            note: "The cost less the lowest of the same optimiser: how fast each comes to its end.",
+            note: "The cost less the lowest of the same optimiser: how fast each comes to its end. Where a cost rises, the optimiser has changed the problem, such as by what it takes for a mismatch, and begins anew; what lies below the end has no place here.",
             cursor: None,
             svg: svg(above, true),
             legend: &legend,

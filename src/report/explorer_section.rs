@@ -21,7 +21,7 @@ pub(super) fn section(report: &SequenceReport, place: usize) -> Result<Markup, E
                     figcaption {
                         h4 { "Scene" }
                         p.note {
-                            "Points, lines by structural group, paths, and the camera at the frame that is chosen. Points that it shows are green, lines thick; estimated paths are dashed."
+                            "Points, lines by structural group, paths, and the camera at the frame that is chosen. Points that it shows are green, lines thick; paths of estimates differ in colour and dashes."
                             @if let Some(instead) = report.landmarks.instead() { " Landmarks are " (instead) "." }
                         }
                     }

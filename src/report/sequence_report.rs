@@ -126,7 +126,7 @@ impl SequenceReport {
         Ok(Self {
             file: name.map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned()),
             encoding: reader.encoding().name(),
-            bytes: storage::size(path),
+            bytes: format::stored_bytes(path),
             runs: Run::of(&reader.table::<Iteration>()?),
             manifest,
             frames,

@@ -180,19 +180,21 @@ pub fn list(folder: &Path, known: &[&str]) -> io::Result<Vec<Entry>> {
 }
 
 /// Bytes of a file, or of all that stands in a folder; 0 where nothing can be looked at. Links to folders are not followed.
+///
+/// * `known` — names that may be in a folder, as for [`list`].
 #[must_use]
-pub fn size(path: &Path) -> u64 {
+pub fn size(path: &Path, known: &[&str]) -> u64 {
     match find(path) {
         Ok(Found::File(bytes)) => bytes,
         Ok(Found::Folder) if is_url(path) => {
             let of = |entry: Entry| if let Found::File(bytes) = entry.found { bytes } else { 0 };
-            list(path, &[]).map_or(0, |entries| entries.into_iter().map(of).sum())
+            list(path, known).map_or(0, |entries| entries.into_iter().map(of).sum())
         }
         Ok(Found::Folder) => {
             let of = |entry: fs::DirEntry| {
                 let is_folder = entry.file_type().is_ok_and(|kind| kind.is_dir());
                 if is_folder {
-                    size(&entry.path())
+                    size(&entry.path(), known)
                 } else {
                     fs::metadata(entry.path()).map_or(0, |found| found.len())
                 }

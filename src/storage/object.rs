@@ -15,6 +15,7 @@ use object_store::gcp::GoogleCloudStorageBuilder;
 use object_store::http::HttpBuilder;
 use object_store::path::Path as Key;
 use object_store::{ClientOptions, GetOptions, ObjectStore, ObjectStoreExt, RetryConfig, WriteMultipart};
+use reqwest::Url;
 use tokio::runtime::{self, Runtime};
 
 use super::{Entry, Found, MARK, scheme};
@@ -25,6 +26,17 @@ const MARKS: [&str; 3] = [MARK, "catalogue.parquet", "summary.parquet"];
 const PART: usize = 8 << 20;
 /// Parts that are under way at once.
 const PARTS_AT_ONCE: usize = 4;
+/// Variables that say where a store is.
+const ENDPOINTS: [&str; 6] = [
+    "AWS_ENDPOINT_URL_S3",
+    "AWS_ENDPOINT_URL",
+    "AWS_ENDPOINT",
+    "AWS_ENDPOINT_URL_STS",
+    "AWS_METADATA_ENDPOINT",
+    "GOOGLE_BASE_URL",
+];
+/// Where machines in a cloud ask for the credentials of their role.
+const ROLES: [&str; 2] = ["169.254.169.254", "metadata.google.internal"];
 /// Letters of a store's answer that are shown.
 const SHOWN: usize = 300;
 
@@ -224,6 +236,15 @@ fn store(scheme: &'static str, host: &str, query: Option<&str>) -> io::Result<Ar
     }
     // Where a program has chosen one already, that one is taken.
     let _ = rustls::crypto::ring::default_provider().install_default();
+    for name in ENDPOINTS {
+        let Ok(value) = std::env::var(name) else { continue };
+        let is_whole =
+            Url::parse(&value).is_ok_and(|url| matches!(url.scheme(), "http" | "https") && url.has_host());
+        if !is_whole {
+            let what = format!("{name}: expected http://HOST or https://HOST, found {value:?}");
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, what));
+        }
+    }
     let plain = |endpoint: &str| endpoint.starts_with("http://");
     let client = |plain: bool| {
         ClientOptions::new().with_allow_http(plain).with_connect_timeout(Duration::from_secs(10))
@@ -279,7 +300,24 @@ fn failed(error: object_store::Error) -> io::Error {
         E::InvalidPath { .. } => io::ErrorKind::InvalidInput,
         _ => io::ErrorKind::Other,
     };
-    let words = error.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
-    let shown: String = words.chars().take(SHOWN).collect();
-    io::Error::new(kind, if shown.len() < words.len() { format!("{shown}…") } else { shown })
+    let line = |text: String| text.split_whitespace().collect::<Vec<_>>().join(" ");
+    let whole = line(error.to_string());
+    let mut words: String = whole.chars().take(SHOWN).collect();
+    if words.len() < whole.len() {
+        words += "…";
+    }
+    // What the system said stands last in the chain of causes.
+    let mut cause: &dyn std::error::Error = &error;
+    while let Some(deeper) = cause.source() {
+        cause = deeper;
+    }
+    let last = line(cause.to_string());
+    if !whole.contains(&last) {
+        words += &format!(": {last}");
+    }
+    if ROLES.iter().any(|place| whole.contains(place)) {
+        let none = "no credentials in the environment (AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, or GOOGLE_SERVICE_ACCOUNT)";
+        words = format!("{none}, and none of a role of this machine: {words}");
+    }
+    io::Error::new(kind, words)
 }

@@ -175,7 +175,7 @@ fn only_what_is_read_is_fetched() {
         store.server.keep_folder("bucket/long", &at.join("long"));
         store.server.keep("bucket/long.mcap", fs::read(at.join("long.mcap")).unwrap());
         for name in ["long", "long.mcap"] {
-            let whole = open_structure::storage::size(&at.join(name));
+            let whole = open_structure::storage::size(&at.join(name), &[]);
             store.server.sent();
             let frame = (beyond * longest / 2).to_string();
             let rows = |path: &str| store.done(at, &["cat", path, "point_measurements", "--frame", &frame]);
@@ -445,11 +445,32 @@ fn what_cannot_be_had_is_said_in_a_line() {
     for (url, expected) in [
         ("http:///a.mcap", "no name of a bucket or host"),
         ("http://127.0.0.1:9/a.mcap", "127.0.0.1:9"),
+        ("http://127.0.0.1:9/a.mcap", "refused"),
         ("http://localhost/a.mcap#first", "without `#`"),
         ("s3://", "no name of a bucket or host"),
     ] {
         let words = store.failed(at, &["info", url]);
         assert!(words.contains(expected), "{words}");
+    }
+}
+
+#[test]
+fn a_wrong_endpoint_is_called_by_its_name() {
+    for (name, url) in [("AWS_ENDPOINT_URL", "s3://bucket/a.mcap"), ("GOOGLE_BASE_URL", "gs://bucket/a.mcap")]
+    {
+        for value in ["localhost:9000", "bogus", "http://", ""] {
+            let output = Command::new(env!("CARGO_BIN_EXE_os"))
+                .args(["info", url])
+                .env(name, value)
+                .env("AWS_ACCESS_KEY_ID", "someone")
+                .env("AWS_SECRET_ACCESS_KEY", "something")
+                .output()
+                .unwrap();
+            let words = String::from_utf8(output.stderr).unwrap();
+            assert_eq!(output.status.code(), Some(1), "{words}");
+            let expected = format!("{name}: expected http://HOST or https://HOST, found {value:?}");
+            assert!(words.contains(&expected), "{words}");
+        }
     }
 }
 

@@ -28,6 +28,10 @@ pub fn catalogue_entry(member: &Member) -> Result<CatalogueEntry, Error> {
             expected: super::folder_name(&manifest.name),
         });
     }
+    if !reader.has::<Frame>() {
+        let detail = "expected frames.parquet, without which it is no sequence; found none".to_owned();
+        return Err(Error::Container { path: member.path.clone(), container: "Parquet", detail });
+    }
     let frames = reader.frame_list()?;
     let centres: Vec<[f64; 3]> = frames.iter().filter_map(centre).collect();
     let extreme =

@@ -15,7 +15,7 @@ use crate::structure::LineId;
 /// Most points that are drawn: more hide each other in a column.
 const MOST_DOTS: usize = 6000;
 /// Groups that the legend names.
-const NAMED: usize = 5;
+const NAMED: usize = 15;
 /// Free around the scene, points.
 const MARGIN: f64 = 6.0;
 /// Length of an axis, points.
@@ -73,6 +73,14 @@ impl SceneView {
             sample: Sample::Stroke(group_colour(style.colours, Some(rank)), 1.4),
             name: name.clone(),
         }));
+        let more = (NAMED..self.groups.len()).filter(|rank| drawn(*rank)).count();
+        if more > 0 {
+            // Their colours are those of groups that are named.
+            entries.push(Entry {
+                sample: Sample::Stroke(group_colour(style.colours, Some(NAMED)), 1.4),
+                name: format!("{more} more"),
+            });
+        }
         if self.shapes.lines.iter().any(|(line, _)| !self.rank_of.contains_key(line)) {
             entries.push(Entry {
                 sample: Sample::Stroke(style.colours.quiet.to_owned(), 1.4),

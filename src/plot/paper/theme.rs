@@ -47,7 +47,7 @@ const DARK: Colours = Colours {
     faint: "#3b4147",
     points: "#1fc997",
     lines: "#ff8a3d",
-    series: ["#56b4e9", "#f0e442", "#ff8a3d", "#4f8fd6", "#e495c3"],
+    series: ["#56b4e9", "#f0e442", "#ff8a3d", "#3a6fe0", "#e495c3"],
 };
 
 impl Theme {

@@ -16,7 +16,7 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("unfinished", &["storage"]),
     ("archive", &["unfinished"]),
     ("datasets", &["structure"]),
-    ("fetch", &["structure", "unfinished", "archive", "datasets"]),
+    ("fetch", &["structure", "storage", "unfinished", "archive", "datasets"]),
     ("format", &["geometry", "structure", "storage", "unfinished"]),
     ("simulate", &["geometry", "structure", "storage"]),
     ("track", &["geometry", "structure"]),

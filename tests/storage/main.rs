@@ -340,6 +340,7 @@ fn a_signed_url_is_good_for_what_it_names() {
     let signed = |name: &str| format!("{}?to=a/b&signature=right", store.url(&format!("signed/{name}")));
     let words = store.failed(at, &["info", &store.url("signed/box1.mcap")]);
     assert!(words.contains("403") || words.contains("not signed"), "{words}");
+    store.server.asked();
     assert_eq!(
         store.done(at, &["cat", &signed("box1.mcap"), "point_measurements", "--frame", "7"]),
         store.done(at, &["cat", "box1.mcap", "point_measurements", "--frame", "7"])

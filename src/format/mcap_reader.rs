@@ -358,7 +358,15 @@ fn check_chunks(path: &Path, summary: &Summary, length: u64) -> Result<(), Error
 
 fn read_summary(file: &CountedFile) -> Result<Summary, Error> {
     let path = file.path();
-    let failed = |error: mcap::McapError| Error::container(path, "MCAP")(error.into());
+    let failed = |error: mcap::McapError| match error {
+        // Those at the beginning are looked at below.
+        mcap::McapError::BadMagic => Error::Container {
+            path: path.to_owned(),
+            container: "MCAP",
+            detail: "the closing magic bytes are missing; was the file cut short?".to_owned(),
+        },
+        error => Error::container(path, "MCAP")(error.into()),
+    };
     let mut magic = [0; 8];
     let read = file.read_at(0, &mut magic).map_err(Error::io(path))?;
     if magic[..read] != *mcap::MAGIC {

@@ -93,7 +93,7 @@ impl Table {
     pub(super) fn markup(&self) -> Markup {
         html! {
             @if let Some(note) = &self.note { p.note { (note) } }
-            div.wide tabindex="0" role="group" aria-label="table" {
+            div.wide tabindex="0" role="group" aria-label=(format!("Table: {}", self.header.join(", "))) {
                 table {
                     thead { tr { @for cell in &self.header { th scope="col" { (cell) } } } }
                     tbody {

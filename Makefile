@@ -12,6 +12,8 @@ CORPUS ?= out/conformance
 FUZZ_SECONDS ?= 30
 # More arguments of libFuzzer.
 FUZZ_ARGS ?=
+# `--dev` builds sooner and tries less in the same time.
+FUZZ_BUILD ?=
 
 # Tests, benchmarks and examples stop at what they did not expect, and need not be pretty.
 TESTS_MAY := $(addprefix --allow clippy::,pedantic unwrap_used expect_used print_stdout print_stderr)
@@ -77,7 +79,7 @@ fuzz:
 	@export RUSTC_BOOTSTRAP=1; for target in $$(cargo fuzz list); do \
 	  echo "== fuzz $$target, $(FUZZ_SECONDS) s"; \
 	  mkdir -p "fuzz/corpus/$$target"; \
-	  cargo fuzz run "$$target" --sanitizer none "fuzz/corpus/$$target" "fuzz/seeds/$$target" -- \
+	  cargo fuzz run $(FUZZ_BUILD) "$$target" --sanitizer none "fuzz/corpus/$$target" "fuzz/seeds/$$target" -- \
 	    -max_total_time=$(FUZZ_SECONDS) -rss_limit_mb=2048 -timeout=10 -max_len=65536 $(FUZZ_ARGS); \
 	done
 

@@ -74,15 +74,18 @@ pub(crate) fn internal(message: &str) -> PyErr {
 
 /// A name under which something stands already.
 fn exists(path: &Path, message: &str) -> PyErr {
-    Kind::Exists.with(|py, class| class.call1((py.import("errno")?.getattr("EEXIST")?, message, path)))
+    Kind::Exists
+        .with(|py, class| class.call1((py.import("errno")?.getattr("EEXIST")?, message, path.as_os_str())))
 }
 
 /// What the operating system said.
 pub(crate) fn system(path: &Path, cause: &io::Error) -> PyErr {
-    let kind = match cause.kind() {
-        io::ErrorKind::NotFound => Kind::NotFound,
-        io::ErrorKind::AlreadyExists => Kind::Exists,
-        _ => Kind::Access,
+    // The number is for what no operating system said, such as an object store.
+    let (kind, number) = match cause.kind() {
+        io::ErrorKind::NotFound => (Kind::NotFound, "ENOENT"),
+        io::ErrorKind::AlreadyExists => (Kind::Exists, "EEXIST"),
+        io::ErrorKind::PermissionDenied => (Kind::Access, "EACCES"),
+        _ => (Kind::Access, "EIO"),
     };
     let text = cause.to_string();
     // Python says the number itself.
@@ -90,9 +93,9 @@ pub(crate) fn system(path: &Path, cause: &io::Error) -> PyErr {
     kind.with(|py, class| {
         let errno = match cause.raw_os_error() {
             Some(number) => number,
-            None => py.import("errno")?.getattr("EIO")?.extract()?,
+            None => py.import("errno")?.getattr(number)?.extract()?,
         };
-        class.call1((errno, text, path))
+        class.call1((errno, text, path.as_os_str()))
     })
 }
 

@@ -50,6 +50,14 @@ impl Frames {
         FrameIterator::new(py, self.sequence.get().source())
     }
 
+    /// Sent to another process, the frames are those of the sequence there.
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyAny>, (Py<Sequence>, &'static str))> {
+        Ok((py.import("builtins")?.getattr("getattr")?, (self.sequence.clone_ref(py), "frames")))
+    }
+
     fn __repr__(&self) -> String {
         format!("<{} frames>", self.ids.len())
     }

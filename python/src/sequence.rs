@@ -1,5 +1,6 @@
 //! A sequence: a file that is open, or what a step made in memory.
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -7,7 +8,7 @@ use open_structure::format::{self, SequenceReader, WriteOptions};
 use open_structure::geometry::Pose;
 use open_structure::storage;
 use open_structure::structure::{self, FactorGraph, Frame as FrameRow, FrameId, PoseRow, TABLES, table_info};
-use pyo3::exceptions::PyKeyError;
+use pyo3::exceptions::{PyKeyError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::PyList;
 
@@ -33,7 +34,8 @@ pub(crate) enum Source {
 /// A sequence: measurements of a camera's way, and what estimators made of them.
 ///
 /// ``Sequence.open`` opens an MCAP file or a Parquet folder; tables are read when they are asked for. The functions of this
-/// package give sequences in memory, which ``write`` stores. A sequence never changes.
+/// package give sequences in memory, which ``write`` stores. A sequence never changes. One that was opened can be pickled: other
+/// processes open it themselves.
 #[pyclass(frozen, module = "open_structure")]
 pub(crate) struct Sequence {
     source: Source,
@@ -94,11 +96,7 @@ impl Sequence {
     pub(crate) fn title(&self) -> String {
         match &self.source {
             Source::Memory(sequence) => sequence.manifest.name.clone(),
-            Source::File(reader) => {
-                let path = reader.path();
-                let name = if storage::is_folder(path) { path.file_name() } else { path.file_stem() };
-                name.map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
-            }
+            Source::File(reader) => reader.file_name(),
         }
     }
 }
@@ -111,12 +109,16 @@ impl Sequence {
         Self::opened(py, path)
     }
 
-    /// Where the sequence lies; ``None`` for one in memory.
+    /// Where the sequence lies: a path, or a URL as ``str``; ``None`` for one in memory.
     #[getter]
-    fn path(&self) -> Option<PathBuf> {
+    fn path<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         match &self.source {
-            Source::File(reader) => Some(reader.path().to_owned()),
-            Source::Memory(_) => None,
+            // A `Path` of Python would take the second slash from a URL.
+            Source::File(reader) if storage::is_url(reader.path()) => {
+                Ok(Some(reader.path().as_os_str().into_pyobject(py)?.into_any()))
+            }
+            Source::File(reader) => Ok(Some(reader.path().into_pyobject(py)?.into_any())),
+            Source::Memory(_) => Ok(None),
         }
     }
 
@@ -284,7 +286,7 @@ impl Sequence {
         let options = WriteOptions { force, foxglove, ..WriteOptions::default() };
         match &self.source {
             Source::File(reader) => {
-                refuse_itself(reader.path(), &path)?;
+                refuse_itself(py, reader.path(), &path)?;
                 tell_left_behind(py, reader)?;
                 work::run(py, errors::of_format, |watch| {
                     format::copy(reader, &path, options, &|_, _| watch.progress())
@@ -341,6 +343,22 @@ impl Sequence {
         }
     }
 
+    /// Sent to another process, a sequence is its path, and is opened there; one in memory has none.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (OsString,))> {
+        let Source::File(reader) = &self.source else {
+            return Err(PyTypeError::new_err(
+                "a sequence in memory cannot be sent to another process; send what `write` gives instead",
+            ));
+        };
+        let path = reader.path();
+        let path = if storage::is_url(path) {
+            path.to_owned()
+        } else {
+            std::path::absolute(path).map_err(|cause| errors::system(path, &cause))?
+        };
+        Ok((py.get_type::<Self>().getattr("open")?, (path.into_os_string(),)))
+    }
+
     /// The names of the tables, for completion by editors: ``sequence["frames"]``.
     fn _ipython_key_completions_<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         PyList::new(py, self.tables())
@@ -356,11 +374,13 @@ pub(crate) fn matrix(pose: &Pose) -> [f64; 16] {
 }
 
 /// Refuses an output that is the input itself.
-fn refuse_itself(input: &Path, output: &Path) -> PyResult<()> {
-    if storage::exists(output) && storage::holds(output, input) {
-        return Err(errors::option(format!("{}: is the input itself, or holds it", output.display())));
-    }
-    Ok(())
+fn refuse_itself(py: Python<'_>, input: &Path, output: &Path) -> PyResult<()> {
+    work::run(py, errors::option, |_| {
+        if storage::exists(output) && storage::holds(output, input) {
+            return Err(format!("{}: is the input itself, or holds it", output.display()));
+        }
+        Ok(())
+    })
 }
 
 /// Warns of what this version does not know, and so does not copy.

@@ -40,7 +40,7 @@ pub(crate) fn simulate(py: Python<'_>, recipe: &Bound<'_, PyAny>, seed: Option<u
                 name.display()
             )));
         };
-        stations::simulation_recipe(name).map_err(errors::of_station)?
+        work::run(py, errors::of_station, |_| stations::simulation_recipe(name))?
     };
     recipe.seed = seed.unwrap_or(recipe.seed);
     let made = work::run(py, errors::of_station, |watch| {

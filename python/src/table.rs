@@ -9,6 +9,8 @@ use arrow::array::{
 use arrow::datatypes::{DataType, Float64Type, Int64Type};
 use arrow::ffi::{FFI_ArrowArray, FFI_ArrowSchema};
 use arrow::ffi_stream::FFI_ArrowArrayStream;
+use arrow::ipc::reader::StreamReader;
+use arrow::ipc::writer::StreamWriter;
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyCapsule, PyDict, PyString};
@@ -128,6 +130,26 @@ impl Table {
 
     fn __len__(&self) -> usize {
         self.batch.num_rows()
+    }
+
+    /// Sent to another process, a table is its rows.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (&str, Bound<'py, PyBytes>))> {
+        let mut stream = Vec::new();
+        let written = StreamWriter::try_new(&mut stream, &self.batch.schema())
+            .and_then(|mut writer| writer.write(&self.batch).and_then(|()| writer.finish()));
+        written.map_err(|cause| errors::internal(&cause.to_string()))?;
+        Ok((py.get_type::<Self>().getattr("_received")?, (&self.name, PyBytes::new(py, &stream))))
+    }
+
+    /// What `__reduce__` sent.
+    #[staticmethod]
+    fn _received(name: &str, stream: &[u8]) -> PyResult<Self> {
+        let batch = StreamReader::try_new(stream, None).and_then(|mut batches| batches.next().transpose());
+        match batch {
+            Ok(Some(batch)) => Ok(Self::new(name, batch)),
+            Ok(None) => Err(errors::option(format!("{name}: expected a table that was sent, found no rows"))),
+            Err(cause) => Err(errors::option(format!("{name}: expected a table that was sent: {cause}"))),
+        }
     }
 
     fn __repr__(&self) -> String {

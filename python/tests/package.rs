@@ -102,6 +102,11 @@ fn functions_give_what_the_commands_give() {
 }
 
 #[test]
+fn stores_of_others_take_and_give_sequences() {
+    pytest(&["test_stores.py"]);
+}
+
+#[test]
 fn types_are_what_the_stubs_say() {
     pytest(&["test_types.py"]);
 }

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
+import operator
 import pickle
 import shutil
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -180,6 +183,26 @@ def test_what_this_version_does_not_know_is_told(folder: Path, tmp_path: Path) -
     frames.to_parquet(later / "frames.parquet", index=False)
     with pytest.warns(UserWarning, match="column mood of frames"):
         open_structure.track(later, method="frame-to-frame")
+
+
+def test_sequences_and_tables_can_be_sent_to_other_processes(
+    folder: Path, mcap: Path, simulated: open_structure.Sequence, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As loaders of PyTorch, joblib, Dask and Ray send them."""
+    for path in (folder, mcap):
+        monkeypatch.chdir(path.parent)
+        sequence = open_structure.Sequence.open(path.name)
+        with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as elsewhere:
+            there = elsewhere.submit(operator.itemgetter("point_measurements"), sequence).result()
+            assert elsewhere.submit(len, sequence.frames).result() == 100
+        assert there.name == "point_measurements"
+        assert there.to_pyarrow().equals(sequence["point_measurements"].to_pyarrow(), check_metadata=True)
+        again = pickle.loads(pickle.dumps(sequence))
+        assert again.path == path
+        nothing = sequence["graph_poses"]
+        assert pickle.loads(pickle.dumps(nothing)).to_pyarrow().equals(nothing.to_pyarrow(), check_metadata=True)
+    with pytest.raises(TypeError, match="send what `write` gives"):
+        pickle.dumps(simulated)
 
 
 def test_exceptions_can_be_sent_elsewhere() -> None:

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use super::batches::{BatchSource, Batches};
-use super::collection::Collection;
+use super::collection::{Collection, sequence_name};
 use super::encoding::Encoding;
 use super::frames::{Cursors, FrameSource, Frames, frame_topics, take_into};
 use super::mcap_reader::McapReader;
@@ -175,6 +175,20 @@ impl SequenceReader {
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// What the file is called without its ending, or the folder, in a collection without `sequence=`: tells apart what was
+    /// made of one sequence.
+    #[must_use]
+    pub fn file_name(&self) -> String {
+        let place = storage::without_query(&self.path);
+        let name = match self.encoding() {
+            Encoding::Mcap => place.file_stem(),
+            Encoding::Parquet => place.file_name(),
+        };
+        let Some(name) = name else { return self.path.display().to_string() };
+        let name = name.to_string_lossy().into_owned();
+        sequence_name(&name).unwrap_or(name)
     }
 
     /// How the sequence is stored.

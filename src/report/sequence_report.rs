@@ -13,7 +13,6 @@ use crate::evaluate::EvaluateOptions;
 use crate::format::{self, SequenceReader};
 use crate::plot::{self, Scene, ViewFrom};
 use crate::statistics::{Analysed, Analysis, Counted};
-use crate::storage;
 use crate::structure::{
     Frame, GraphLine, GraphPoint, Iteration, LineLandmark, LineMeasurement, Manifest, MapLine, MapPoint,
     PointLandmark, PointMeasurement, StructuralGroup, TrajectoryPose,
@@ -121,10 +120,8 @@ impl SequenceReport {
         let mut validation = validate::validate(path, &rules)?;
         // The same page wherever the file lies.
         validation.path = None;
-        let place = storage::without_query(path);
-        let name = if storage::is_folder(path) { place.file_name() } else { place.file_stem() };
         Ok(Self {
-            file: name.map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned()),
+            file: reader.file_name(),
             encoding: reader.encoding().name(),
             bytes: format::stored_bytes(path),
             runs: Run::of(&reader.table::<Iteration>()?),

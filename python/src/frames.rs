@@ -12,6 +12,7 @@ use pyo3::prelude::*;
 use crate::errors;
 use crate::frame::Frame;
 use crate::sequence::{Sequence, Source};
+use crate::work;
 
 /// Frames that were read and wait to be taken.
 const WAITING: usize = 16;
@@ -97,7 +98,7 @@ impl FrameIterator {
                     Err(error) => drop(sender.send(Err(error))),
                 };
                 thread::Builder::new()
-                    .spawn(read)
+                    .spawn(|| work::among_threads(read))
                     .map_err(|cause| errors::step(format!("no thread to read with: {cause}")))?;
                 Next::File(receiver)
             }

@@ -26,6 +26,7 @@ use pyo3::prelude::*;
 /// Sequences of Open-Structure as Arrow tables, and the steps of the program `os` as functions.
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    work::loaded();
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<column::Column>()?;
     module.add_class::<frame::Frame>()?;

@@ -2,6 +2,8 @@
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::process;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::thread;
@@ -15,6 +17,28 @@ use crate::errors;
 const PATIENCE: Duration = Duration::from_millis(50);
 /// Stack of the thread that works, as large as that of a program's first thread.
 const STACK_BYTES: usize = 8 << 20;
+
+/// The process that loaded this library.
+static LOADED_BY: OnceLock<u32> = OnceLock::new();
+
+/// Remembers the process that loads this library.
+pub(crate) fn loaded() {
+    LOADED_BY.get_or_init(process::id);
+}
+
+/// Does work where it finds threads.
+///
+/// A process that was forked, as loaders of data are, has none of the threads that its parent's work was shared among, and
+/// would wait for them for ever; there work has a thread of its own, and leaves the cores to the processes beside it.
+pub(crate) fn among_threads<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+    if LOADED_BY.get().is_none_or(|process| *process == process::id()) {
+        return work();
+    }
+    match rayon::ThreadPoolBuilder::new().num_threads(1).stack_size(STACK_BYTES).build() {
+        Ok(pool) => pool.install(work),
+        Err(_) => work(),
+    }
+}
 
 /// Tells work that it is no longer wanted.
 #[derive(Debug, Default)]
@@ -71,7 +95,7 @@ fn side_by_side<T: Send, E: Send>(
     thread::scope(|scope| {
         let worker = move || {
             let _done = done;
-            catch_unwind(AssertUnwindSafe(|| work(watch)))
+            catch_unwind(AssertUnwindSafe(|| among_threads(|| work(watch))))
         };
         let worker = match thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, worker) {
             Ok(worker) => worker,

@@ -239,6 +239,35 @@ def test_options_that_have_no_meaning(tracked: Sequence, simulated: Sequence) ->
         open_structure.track(tracked, seed="one")
 
 
+def test_forked_processes_work_and_read_what_their_parent_opened(tracked: Sequence, tmp_path: Path) -> None:
+    """Threads are not forked along, and a file's place is shared: as loaders of PyTorch do on Linux."""
+    tracked.write(tmp_path / "folder")
+    tracked.write(tmp_path / "file.mcap")
+    script = """
+import hashlib, multiprocessing, sys, open_structure
+opened = [open_structure.Sequence.open(name) for name in ("folder", "file.mcap")]
+first = open_structure.adjust(opened[0], method="point", max_iterations=2)
+
+def read(sequence):
+    taken = [frame.point_measurements["u"].tobytes() for frame in sequence.frames]
+    taken += [sequence.frames[place].point_measurements["v"].tobytes() for place in range(len(sequence))]
+    taken += [sequence[name].to_pyarrow().to_pandas().to_json().encode() for name in ("frames", "map_points", "trajectories")]
+    return hashlib.sha256(b"".join(taken)).hexdigest()
+
+def work(place):
+    again = open_structure.adjust(opened[place % 2], method="point", max_iterations=2)
+    assert again["map_points"].to_pyarrow().equals(first["map_points"].to_pyarrow())
+    return [read(sequence) for sequence in opened]
+
+expected = [read(sequence) for sequence in opened]
+with multiprocessing.get_context("fork").Pool(3) as processes:
+    found = processes.map_async(work, range(6), 1).get(timeout=90)
+assert found == [expected] * 6, found
+"""
+    done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
 def test_other_threads_run_and_an_interrupt_ends_the_work(tmp_path: Path) -> None:
     """Ctrl-C in the middle of a long simulation raises KeyboardInterrupt soon."""
     script = """

@@ -5,7 +5,8 @@ use std::fs;
 use std::io::{self, Read};
 use std::ops::Range;
 use std::path::Path;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::process;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use bytes::Bytes;
@@ -40,18 +41,20 @@ const ROLES: [&str; 2] = ["169.254.169.254", "metadata.google.internal"];
 /// Letters of a store's answer that are shown.
 const SHOWN: usize = 300;
 
-/// A store that is spoken to, by scheme and bucket or host.
-type Stores = BTreeMap<String, Arc<dyn ObjectStore>>;
+/// A store that is spoken to, by process, scheme and bucket or host.
+type Stores = BTreeMap<(u32, String), Arc<dyn ObjectStore>>;
 
 /// What a URL names.
 #[derive(Clone, Debug)]
 pub(super) struct Object {
-    store: Arc<dyn ObjectStore>,
+    scheme: &'static str,
+    /// The bucket, or the host.
+    host: String,
+    /// What the URL has more than a place, as signed ones have: it is good for one file, and perhaps for GET alone.
+    query: Option<String>,
     key: Key,
     /// Whether the store lists what is in it; HTTP does not.
     lists: bool,
-    /// Whether the URL has more than a place, as signed ones have: it is good for one file, and perhaps for GET alone.
-    has_query: bool,
 }
 
 impl Object {
@@ -74,12 +77,14 @@ impl Object {
         // Of HTTP the letters are encoded, of the others they stand as they are.
         let key = if is_http { Key::from_url_path(key) } else { Key::parse(key.trim_end_matches('/')) };
         let key = key.map_err(|error| invalid(error.to_string()))?;
-        Ok(Some(Self {
-            store: store(scheme, host, query)?,
-            key,
-            lists: !is_http,
-            has_query: query.is_some(),
-        }))
+        let object =
+            Self { scheme, host: host.to_owned(), query: query.map(str::to_owned), key, lists: !is_http };
+        object.store().map(|_| Some(object))
+    }
+
+    /// The store it is in. Asked for each time: in a process that was forked, those of its parent answer nobody.
+    fn store(&self) -> io::Result<Arc<dyn ObjectStore>> {
+        store(self.scheme, &self.host, self.query.as_deref())
     }
 
     /// The object of a name in this one as a folder.
@@ -102,7 +107,7 @@ impl Object {
         }
         // Servers answer for folders too, with a page for people; so whatever has no ending may be one.
         let may_be_folder = is_root || !self.key.filename().is_some_and(|name| name.contains('.'));
-        if may_be_folder && !self.has_query && !self.list(&MARKS)?.is_empty() {
+        if may_be_folder && !self.query.is_some() && !self.list(&MARKS)?.is_empty() {
             return Ok(Found::Folder);
         }
         self.state().map(|(bytes, _)| Found::File(bytes))
@@ -110,14 +115,14 @@ impl Object {
 
     /// How many bytes it has, and what tells its state from another.
     pub(super) fn state(&self) -> io::Result<(u64, Option<String>)> {
-        if self.has_query {
+        if self.query.is_some() {
             // What was signed for GET is not for HEAD.
             let options = GetOptions { range: Some((0..1).into()), ..GetOptions::default() };
-            if let Ok(answer) = wait(self.store.get_opts(&self.key, options)) {
+            if let Ok(answer) = wait(self.store()?.get_opts(&self.key, options)) {
                 return Ok((answer.meta.size, answer.meta.e_tag));
             }
         }
-        let about = wait(self.store.head(&self.key))?;
+        let about = wait(self.store()?.head(&self.key))?;
         Ok((about.size, about.e_tag))
     }
 
@@ -134,7 +139,7 @@ impl Object {
             return Ok(entries);
         }
         let listed =
-            wait(self.store.list_with_delimiter(Some(&self.key).filter(|key| !key.as_ref().is_empty())))?;
+            wait(self.store()?.list_with_delimiter(Some(&self.key).filter(|key| !key.as_ref().is_empty())))?;
         let named = |key: &Key, found| key.filename().map(|name| Entry { name: name.into(), found });
         let files = listed.objects.iter().filter_map(|about| named(&about.location, Found::File(about.size)));
         let folders = listed.common_prefixes.iter().filter_map(|key| named(key, Found::Folder));
@@ -146,13 +151,14 @@ impl Object {
         // A weak tag promises too little to be asked for.
         let tag = tag.filter(|tag| !tag.starts_with("W/")).map(str::to_owned);
         let options = GetOptions { range: Some(range.into()), if_match: tag, ..GetOptions::default() };
-        wait(async { self.store.get_opts(&self.key, options).await?.bytes().await })
+        let store = self.store()?;
+        wait(async { store.get_opts(&self.key, options).await?.bytes().await })
     }
 
     /// All of it, part by part.
     pub(super) fn fetch(&self, take: &mut dyn FnMut(&[u8]) -> io::Result<()>) -> io::Result<()> {
         let runtime = runtime()?;
-        let mut parts = runtime.block_on(self.store.get(&self.key)).map_err(failed)?.into_stream();
+        let mut parts = runtime.block_on(self.store()?.get(&self.key)).map_err(failed)?.into_stream();
         while let Some(part) = runtime.block_on(parts.next()) {
             take(&part.map_err(failed)?)?;
         }
@@ -174,9 +180,9 @@ impl Object {
         if file.metadata()?.len() <= PART as u64 || !self.lists {
             let mut bytes = Vec::new();
             file.read_to_end(&mut bytes)?;
-            return wait(self.store.put(&self.key, bytes.into())).map(drop);
+            return wait(self.store()?.put(&self.key, bytes.into())).map(drop);
         }
-        let upload = wait(self.store.put_multipart(&self.key))?;
+        let upload = wait(self.store()?.put_multipart(&self.key))?;
         let runtime = runtime()?;
         let _inside = runtime.enter();
         let mut upload = WriteMultipart::new_with_chunk_size(upload, PART);
@@ -202,7 +208,7 @@ impl Object {
 
     /// Removes it, if it is there.
     pub(super) fn remove(&self) -> io::Result<()> {
-        match wait(self.store.delete(&self.key)) {
+        match wait(self.store()?.delete(&self.key)) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
             // Over HTTP many servers let nothing be removed; there it is replaced.
             Err(_) if !self.lists => Ok(()),
@@ -223,7 +229,7 @@ fn send_parts(file: &mut fs::File, upload: &mut WriteMultipart) -> io::Result<()
     }
 }
 
-/// The store of a scheme and a bucket or host, made once; over HTTP also of a query, which stands behind each of its URLs.
+/// The store of a scheme and a bucket or host, made once in a process; over HTTP also of a query, which stands behind each of its URLs.
 fn store(scheme: &'static str, host: &str, query: Option<&str>) -> io::Result<Arc<dyn ObjectStore>> {
     static STORES: Mutex<Stores> = Mutex::new(BTreeMap::new());
     let base = match query {
@@ -231,7 +237,8 @@ fn store(scheme: &'static str, host: &str, query: Option<&str>) -> io::Result<Ar
         None => format!("{scheme}://{host}"),
     };
     let mut stores = STORES.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(store) = stores.get(&base) {
+    let by = (process::id(), base.clone());
+    if let Some(store) = stores.get(&by) {
         return Ok(Arc::clone(store));
     }
     // Where a program has chosen one already, that one is taken.
@@ -268,16 +275,21 @@ fn store(scheme: &'static str, host: &str, query: Option<&str>) -> io::Result<Ar
             Arc::new(builder.with_client_options(client(scheme == "http")).build().map_err(failed)?)
         }
     };
-    stores.insert(base, Arc::clone(&store));
+    stores.insert(by, Arc::clone(&store));
     Ok(store)
 }
 
-/// What waits for answers, made once.
+/// What waits for answers, made once in a process: the threads of its parent are not those of one that was forked.
 fn runtime() -> io::Result<&'static Runtime> {
-    static RUNTIME: OnceLock<io::Result<Runtime>> = OnceLock::new();
-    let made =
-        RUNTIME.get_or_init(|| runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build());
-    made.as_ref().map_err(|error| io::Error::new(error.kind(), error.to_string()))
+    static RUNTIME: Mutex<Option<(u32, &'static Runtime)>> = Mutex::new(None);
+    let mut made = RUNTIME.lock().unwrap_or_else(PoisonError::into_inner);
+    match *made {
+        Some((process, runtime)) if process == process::id() => Ok(runtime),
+        _ => {
+            let runtime = runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build()?;
+            Ok(made.insert((process::id(), Box::leak(Box::new(runtime)))).1)
+        }
+    }
 }
 
 fn wait<T>(answer: impl Future<Output = object_store::Result<T>>) -> io::Result<T> {

@@ -1,12 +1,13 @@
 //! An object that is read in blocks, the last ones kept.
 
 use std::fs;
-use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::io::{self, Write};
 use std::sync::{Mutex, PoisonError};
 
 use bytes::Bytes;
 
 use super::object::Object;
+use super::source;
 
 /// Bytes of a block: about what a network delivers in the time that a request takes.
 const BLOCK: usize = 1 << 18;
@@ -43,9 +44,8 @@ impl ObjectFile {
         if offset >= self.length || buffer.is_empty() {
             return Ok(0);
         }
-        if let Some(whole) = self.whole.lock().unwrap_or_else(PoisonError::into_inner).as_mut() {
-            whole.seek(SeekFrom::Start(offset))?;
-            return whole.read(buffer);
+        if let Some(whole) = self.whole.lock().unwrap_or_else(PoisonError::into_inner).as_ref() {
+            return source::read_at(whole, offset, buffer);
         }
         let number = offset / BLOCK as u64;
         let block = match self.kept(number).map_or_else(|| self.fetch(number), Ok) {

@@ -1,9 +1,8 @@
 //! Bytes at any place of a file, for any number of readers.
 
 use std::fs;
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io;
 use std::path::Path;
-use std::sync::{Mutex, PoisonError};
 
 use super::Object;
 #[cfg(feature = "remote")]
@@ -13,7 +12,7 @@ use super::object_file::ObjectFile;
 #[derive(Debug)]
 pub(crate) enum Source {
     /// On this machine, and how long it is.
-    Local(Mutex<fs::File>, u64),
+    Local(fs::File, u64),
     /// In an object store.
     #[cfg(feature = "remote")]
     Remote(ObjectFile),
@@ -30,7 +29,7 @@ impl Source {
             None => {
                 let file = fs::File::open(path)?;
                 let length = file.metadata()?.len();
-                Ok(Self::Local(Mutex::new(file), length))
+                Ok(Self::Local(file, length))
             }
         }
     }
@@ -47,13 +46,21 @@ impl Source {
     /// Reads some bytes at a place; fewer at the end of the file.
     pub(crate) fn read_at(&self, offset: u64, buffer: &mut [u8]) -> io::Result<usize> {
         match self {
-            Self::Local(file, _) => {
-                let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
-                file.seek(SeekFrom::Start(offset))?;
-                file.read(buffer)
-            }
+            Self::Local(file, _) => read_at(file, offset, buffer),
             #[cfg(feature = "remote")]
             Self::Remote(file) => file.read_at(offset, buffer),
         }
     }
+}
+
+/// Reads some bytes at a place of a file, wherever others read: a process that was forked shares the file with its parent.
+#[cfg(unix)]
+pub(super) fn read_at(file: &fs::File, offset: u64, buffer: &mut [u8]) -> io::Result<usize> {
+    std::os::unix::fs::FileExt::read_at(file, buffer, offset)
+}
+
+/// Reads some bytes at a place of a file, wherever others read.
+#[cfg(windows)]
+pub(super) fn read_at(file: &fs::File, offset: u64, buffer: &mut [u8]) -> io::Result<usize> {
+    std::os::windows::fs::FileExt::seek_read(file, buffer, offset)
 }

@@ -107,7 +107,7 @@ impl Object {
         }
         // Servers answer for folders too, with a page for people; so whatever has no ending may be one.
         let may_be_folder = is_root || !self.key.filename().is_some_and(|name| name.contains('.'));
-        if may_be_folder && !self.query.is_some() && !self.list(&MARKS)?.is_empty() {
+        if may_be_folder && self.query.is_none() && !self.list(&MARKS)?.is_empty() {
             return Ok(Found::Folder);
         }
         self.state().map(|(bytes, _)| Found::File(bytes))

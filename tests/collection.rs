@@ -154,6 +154,10 @@ fn what_lies_outside_is_never_left_out_in_silence() {
     ended(at, &["copy", "all/sequence=a", "-o", "all/again"], 0);
     let words = ended(at, &["index", "all", "--adopt", "--force"], 1);
     assert!(words.contains("sequence=a: exists already"), "{words}");
+    fs::rename(at.join("all/sequence=a"), at.join("all/another")).unwrap();
+    let words = ended(at, &["index", "all", "--adopt", "--force"], 1);
+    assert!(words.contains("again and ") && words.contains("both hold a sequence called `a`"), "{words}");
+    fs::rename(at.join("all/another"), at.join("all/sequence=a")).unwrap();
     fs::remove_dir_all(at.join("all/again")).unwrap();
     ended(at, &["copy", "all/sequence=a", "-o", "all/a.mcap"], 0);
     let words = ended(at, &["index", "all", "--adopt", "--force"], 1);

@@ -213,6 +213,26 @@ fn many_seeds_give_the_files_that_each_seed_gives_alone() {
     }
 }
 
+#[test]
+fn seeds_with_names_of_their_own_lie_in_one_collection() {
+    let folder = tempfile::tempdir().unwrap();
+    let [mcap, _] = inputs(folder.path());
+    let output = folder.path().join("all/any");
+    let named = ["--noise", "gaussian", "--name", "a b"];
+    done(&[&["measure", text(&mcap), "-o", text(&output), "--seeds", "0..1"], &named[..]].concat());
+    done(&["index", text(&folder.path().join("all")), "--adopt"]);
+    for seed in [0, 1] {
+        let path = folder.path().join("all").join(format::folder_name(&format!("a b-{seed}")));
+        assert_eq!(format::open(&path).unwrap().manifest().name, format!("a b-{seed}"));
+    }
+    for wrong in ["", " a", "a/b", "a\nb"] {
+        let output = folder.path().join("wrong");
+        let arguments = ["measure", text(&mcap), "-o", text(&output), "--noise", "gaussian", "--name", wrong];
+        assert_eq!(os(&arguments).status.code(), Some(1), "{wrong:?}");
+        assert!(!output.exists());
+    }
+}
+
 /// The bytes of a file, or of every file of a folder.
 fn bytes(path: &Path) -> BTreeMap<String, Vec<u8>> {
     let files = match fs::read_dir(path) {

@@ -232,6 +232,11 @@ fn a_measurement_image_has_every_point_and_segment_of_its_frame_in_the_shape_of_
     let drawn = svg(at, &["measurements", "short", "--frames", "3,10..12"]);
     let document = Document::parse(&drawn).unwrap();
     assert!(words(&document).iter().any(|words| words == "(c) frame 11"), "{:?}", words(&document));
+    // One legend for all frames, with every group of lines.
+    for group in sequence.structural_groups.iter().filter(|group| !group.line_ids.is_empty()) {
+        let named = words(&document).into_iter().filter(|words| *words == group.group_id.to_string());
+        assert_eq!(named.count(), 1, "{}", group.group_id);
+    }
     let bundles: Vec<_> = sequence.bundles().collect();
     for (panel, frame) in [3, 10, 11].into_iter().enumerate() {
         let bundle = &bundles[frame];
@@ -424,7 +429,24 @@ fn what_keeps_a_figure_from_being_made_is_said_and_leaves_nothing_behind() {
             1,
             "expected frame 70, found frames from 0 to 39",
         ),
-        (&["xyz", "both.mcap", "-o", "a.pdf", "--columns", "2"], 1, "--columns"),
+        (
+            &["xyz", "both.mcap", "-o", "a.pdf", "--columns", "2"],
+            2,
+            "--columns does not go with the figure xyz",
+        ),
+        (
+            &["ape", "both.mcap", "-o", "a.pdf", "--frames", "3"],
+            2,
+            "--frames does not go with the figure ape",
+        ),
+        (&["scene", "both.mcap", "-o", "a.pdf", "--over", "time"], 2, "--over does not go with"),
+        (&["tracks", "short", "-o", "a.pdf", "--estimate", "mine"], 2, "--estimate does not go with"),
+        (&["rpe", "both.mcap", "-o", "a.pdf", "--view", "top"], 2, "Usage: os plot"),
+        (
+            &["scene", "both.mcap", "-o", "a.svg", "--dpi", "50"],
+            2,
+            "--dpi goes with a file that ends in .png",
+        ),
         (&["features", "broken.mcap", "-o", "a.pdf"], 1, "broken.mcap"),
         (&["scene", "both.mcap", "-o", "both.mcap.svg/../both.mcap"], 2, "expected a name"),
     ] {

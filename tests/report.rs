@@ -276,7 +276,7 @@ fn inputs_that_are_nothing_of_all_this_are_refused_with_what_they_are() {
     let at = folder.path();
     ended(at, &["report", "short"], 2);
     ended(at, &["report", "-o", "r.html"], 2);
-    let words = ended(at, &["report", "short", "-o", "r.svg"], 1);
+    let words = ended(at, &["report", "short", "-o", "r.svg"], 2);
     assert!(words.contains(".html"), "{words}");
     fs::write(at.join("other.json"), "[{\"colour\": 1}]").unwrap();
     let words = ended(at, &["report", "other.json", "-o", "r.html"], 1);

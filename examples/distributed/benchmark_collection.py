@@ -18,6 +18,7 @@ made twice.
 
 import argparse
 import json
+import os
 import shlex
 import subprocess
 import sys
@@ -131,7 +132,10 @@ def main() -> None:
     end = words.index("--") if "--" in words else len(words)
     arguments, options = parser.parse_args(words[:end]), tuple(words[end + 1 :])
 
-    collection, runs = arguments.collection.absolute(), arguments.output.absolute().with_suffix(".runs")
+    collection, output = arguments.collection.absolute(), Path(os.path.abspath(arguments.output))
+    if output.exists() and not (output / "plan.json").is_file():
+        sys.exit(f"{output}: expected a folder of results with plan.json, or none; found something else")
+    runs = output.with_name(f"{output.name}.runs")
     collection.mkdir(parents=True, exist_ok=True)
     program = arguments.program
     jobs = read_jobs(arguments.jobs, collection, program) if arguments.jobs else []

@@ -44,6 +44,7 @@ def packed(kind: str, given: Any) -> tuple[bytes, bytes, list[list[float] | None
         ids, numbers = whole(f"{kind}: ids", given[0]), floats(kind, given[1])
         numbers = shaped(kind, rows, len(ids), numbers)
     else:
+        one_estimate(kind, given)
         ids = whole(f"{kind}: {rows.identity}", column(kind, given, rows.identity))
         parts = [floats(f"{kind}: {name}", column(kind, given, name)) for name in rows.columns]
         for name, part in zip(rows.columns, parts, strict=True):
@@ -53,6 +54,14 @@ def packed(kind: str, given: Any) -> tuple[bytes, bytes, list[list[float] | None
         if has(given, "covariance"):
             covariances = [covariance(kind, rows, row) for row in column(kind, given, "covariance")]
     return ids.tobytes(), np.ascontiguousarray(numbers).tobytes(), covariances
+
+
+def one_estimate(kind: str, given: Any) -> None:
+    """Refuses rows of several estimates, which would become one."""
+    if has(given, "estimate"):
+        names = sorted({str(name) for name in column(kind, given, "estimate")})
+        if len(names) > 1:
+            raise OptionError(f"{kind}: expected rows of one estimate, found {', '.join(names)}")
 
 
 def has(given: Any, name: str) -> bool:
@@ -72,6 +81,10 @@ def column(kind: str, given: Any, name: str) -> Any:
 
 def array(what: str, values: Any) -> npt.NDArray[Any]:
     """Anything that numpy takes; what it does not take is an error of ours."""
+    if np.ma.isMaskedArray(values):
+        if np.ma.getmaskarray(values).any():
+            raise OptionError(f"{what}: expected rows without masked numbers; leave them out")
+        values = values.data
     try:
         return np.asarray(values)
     except (TypeError, ValueError) as cause:
@@ -131,6 +144,16 @@ def from_matrices(matrices: Numbers) -> Numbers:
         if row is not None:
             raise OptionError(f"poses row {row}: expected a last row of 0, 0, 0, 1, found {matrices[row, 3].tolist()}")
     return np.concatenate([translations, quaternions(rotations)], axis=1)
+
+
+def pose(what: str, given: Any) -> list[float]:
+    """One pose as seven numbers."""
+    numbers = floats(what, given)
+    if numbers.shape == (4, 4):
+        numbers = from_matrices(numbers[np.newaxis])[0]
+    if numbers.shape != (7,):
+        raise OptionError(f"{what}: expected seven numbers or a matrix (4, 4), found shape {numbers.shape}")
+    return [float(number) for number in numbers]
 
 
 def quaternions(r: Numbers) -> Numbers:

@@ -53,6 +53,11 @@ fn words(bytes: &[u8]) -> impl Iterator<Item = [u8; 8]> + '_ {
     bytes.as_chunks::<8>().0.iter().copied()
 }
 
+/// A pose as translation and quaternion tx, ty, tz, qx, qy, qz, qw.
+pub(crate) fn pose(what: &str, given: &Bound<'_, PyAny>) -> PyResult<[f64; 7]> {
+    given.py().import("open_structure._estimate")?.call_method1("pose", (what, given))?.extract()
+}
+
 /// An estimate of what the user gave.
 pub(crate) fn packed(
     py: Python<'_>,

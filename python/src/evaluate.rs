@@ -11,7 +11,7 @@ use open_structure::stations::{self, EvaluateRequest};
 use open_structure::structure::{FrameId, ResultTable, Sequence as Rows};
 use pyo3::prelude::*;
 
-use crate::arguments::{Given, choice};
+use crate::arguments::{Given, at_least_one, choice};
 use crate::errors;
 use crate::table::Table;
 use crate::work;
@@ -87,6 +87,12 @@ impl Asked<'_> {
         };
         let step =
             Step { all_pairs: self.all_pairs, of_reference: self.pairs_from_reference, ..Step::new(delta) };
+        if let Some(first) = self.align_first {
+            at_least_one("align_first", first)?;
+        }
+        if matches!(&self.estimate, Some(Names::Several(names)) if names.is_empty()) {
+            return Err(errors::option("estimate: expected a name, found none"));
+        }
         let options = EvaluateOptions { alignment: Alignment { kind, first: self.align_first }, step };
         Ok(EvaluateRequest { estimates: Names::all(self.estimate), reference: self.reference, options })
     }

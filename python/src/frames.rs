@@ -8,6 +8,8 @@ use open_structure::format::Error;
 use open_structure::structure::{FrameBundle, FrameId, Sequence as Rows};
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
+use pyo3::types::slice::PySliceIndices;
+use pyo3::types::{PyList, PySlice};
 
 use crate::errors;
 use crate::frame::Frame;
@@ -25,6 +27,16 @@ pub(crate) struct Frames {
 }
 
 impl Frames {
+    fn at(&self, py: Python<'_>, place: isize) -> PyResult<Frame> {
+        let index =
+            if place < 0 { self.ids.len().checked_add_signed(place) } else { usize::try_from(place).ok() };
+        let id = index.and_then(|index| self.ids.get(index));
+        let id = id.ok_or_else(|| {
+            PyIndexError::new_err(format!("{} frames, no frame at {place}", self.ids.len()))
+        })?;
+        self.sequence.get().frame(py, id.0)
+    }
+
     pub(crate) fn new(sequence: Py<Sequence>, ids: Vec<FrameId>) -> Self {
         Self { sequence, ids }
     }
@@ -36,15 +48,22 @@ impl Frames {
         self.ids.len()
     }
 
-    /// The frame at a place; counted from the end where it is negative.
-    fn __getitem__(&self, py: Python<'_>, place: isize) -> PyResult<Frame> {
-        let index =
-            if place < 0 { self.ids.len().checked_add_signed(place) } else { usize::try_from(place).ok() };
-        let id = index.and_then(|index| self.ids.get(index));
-        let id = id.ok_or_else(|| {
-            PyIndexError::new_err(format!("{} frames, no frame at {place}", self.ids.len()))
-        })?;
-        self.sequence.get().frame(py, id.0)
+    /// The frame at a place, counted from the end where it is negative; of a slice the frames, as a list.
+    fn __getitem__<'py>(&self, py: Python<'py>, place: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        if let Ok(slice) = place.cast::<PySlice>() {
+            let PySliceIndices { start, step, slicelength, .. } =
+                slice.indices(self.ids.len().try_into()?)?;
+            let places = (0..slicelength).map(|count| start + step * count.cast_signed());
+            let frames = places.map(|place| self.at(py, place)).collect::<PyResult<Vec<_>>>()?;
+            return Ok(PyList::new(py, frames)?.into_any());
+        }
+        Ok(Bound::new(py, self.at(py, place.extract()?)?)?.into_any())
+    }
+
+    fn __reversed__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let builtins = slf.py().import("builtins")?;
+        let places = builtins.call_method1("range", (slf.get().ids.len(),))?.call_method0("__reversed__")?;
+        builtins.call_method1("map", (slf.getattr("__getitem__")?, places))
     }
 
     fn __iter__(&self, py: Python<'_>) -> PyResult<FrameIterator> {

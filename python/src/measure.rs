@@ -28,7 +28,7 @@ use crate::work;
 /// * ``keep_estimates``: keep trajectories, maps and graphs.
 /// * ``complete_depths``: keep the measurements that are there, and give those without depth one, drawn about the true depth.
 #[pyfunction]
-#[pyo3(signature = (sequence, noise, *, seed = 0, set = None, outliers = None, missed = None, quantise = None, drop_outside = false, keep_depth = false, keep_estimates = false, complete_depths = false))]
+#[pyo3(signature = (sequence, noise, *, seed = 0, set = None, outliers = None, missed = None, quantise = None, drop_outside = false, keep_depth = false, keep_estimates = false, complete_depths = false, name = None))]
 #[expect(
     clippy::too_many_arguments,
     clippy::fn_params_excessive_bools,
@@ -47,6 +47,7 @@ pub(crate) fn measure(
     keep_depth: bool,
     keep_estimates: bool,
     complete_depths: bool,
+    name: Option<String>,
 ) -> PyResult<Sequence> {
     let model = choice("noise", noise, &NoiseModel::ALL.map(|model| (model.name(), model)))?;
     let mut recipe = NoiseRecipe::new(model);
@@ -69,7 +70,7 @@ pub(crate) fn measure(
     if let Some((option, _)) = idle.iter().find(|(_, given)| complete_depths && *given) {
         return Err(errors::option(format!("{option} does not go with complete_depths")));
     }
-    let (input, request) = (sequence.rows()?, MeasureRequest { recipe, seed, keep_estimates });
+    let (input, request) = (sequence.rows()?, MeasureRequest { recipe, seed, keep_estimates, name });
     let (made, summary) = work::run(py, errors::of_station, |_| {
         if complete_depths {
             let (made, done) = stations::complete_depths(&input, &request)?;

@@ -49,6 +49,12 @@ impl Sequence {
     }
 
     fn opened(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        // The program may go to another folder later on.
+        let path = if storage::is_url(&path) {
+            path
+        } else {
+            std::path::absolute(&path).map_err(|cause| errors::system(&path, &cause))?
+        };
         let reader = work::run(py, errors::of_format, |_| format::open(&path))?;
         Ok(Self { source: Source::File(Arc::new(reader)), summary: None })
     }
@@ -204,7 +210,20 @@ impl Sequence {
     }
 
     fn __getitem__(&self, py: Python<'_>, name: &str) -> PyResult<Table> {
-        self.table(py, name)
+        match table_info(name) {
+            Some(_) => self.table(py, name),
+            None => Err(PyKeyError::new_err(name.to_owned())),
+        }
+    }
+
+    // A sequence never changes, so a copy is the same.
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__<'py>(slf: Py<Self>, memo: &Bound<'py, PyAny>) -> Py<Self> {
+        let _ = memo;
+        slf
     }
 
     /// Every frame in order, with its rows; looks like a list.
@@ -214,8 +233,8 @@ impl Sequence {
         Ok(Frames::new(slf.unbind(), rows.into_iter().map(|frame| frame.frame_id).collect()))
     }
 
-    fn __contains__(&self, table: &str) -> bool {
-        self.tables().contains(&table)
+    fn __contains__(&self, table: &Bound<'_, PyAny>) -> bool {
+        table.extract::<String>().is_ok_and(|table| self.tables().contains(&table.as_str()))
     }
 
     fn __len__(&self, py: Python<'_>) -> PyResult<usize> {
@@ -350,13 +369,7 @@ impl Sequence {
                 "a sequence in memory cannot be sent to another process; send what `write` gives instead",
             ));
         };
-        let path = reader.path();
-        let path = if storage::is_url(path) {
-            path.to_owned()
-        } else {
-            std::path::absolute(path).map_err(|cause| errors::system(path, &cause))?
-        };
-        Ok((py.get_type::<Self>().getattr("open")?, (path.into_os_string(),)))
+        Ok((py.get_type::<Self>().getattr("open")?, (reader.path().as_os_str().to_owned(),)))
     }
 
     /// The names of the tables, for completion by editors: ``sequence["frames"]``.

@@ -28,7 +28,13 @@ pub(crate) fn recipes() -> Vec<&'static str> {
 #[pyo3(signature = (recipe, *, seed = None))]
 pub(crate) fn simulate(py: Python<'_>, recipe: &Bound<'_, PyAny>, seed: Option<u64>) -> PyResult<Sequence> {
     let (mut recipe, folder) = if let Ok(recipe) = recipe.cast::<PyDict>() {
-        let text: String = py.import("json")?.call_method1("dumps", (recipe,))?.extract()?;
+        let options = PyDict::new(py);
+        // Numbers of numpy.
+        options.set_item("default", py.import("operator")?.call_method1("methodcaller", ("item",))?)?;
+        options.set_item("allow_nan", false)?;
+        let text = py.import("json")?.call_method("dumps", (recipe,), Some(&options));
+        let text: String =
+            text.map_err(|cause| errors::option(format!("recipe: {}", cause.value(py))))?.extract()?;
         let recipe: Recipe =
             serde_json::from_str(&text).map_err(|cause| errors::option(format!("recipe: {cause}")))?;
         (recipe, PathBuf::new())

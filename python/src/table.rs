@@ -13,7 +13,7 @@ use arrow::ipc::reader::StreamReader;
 use arrow::ipc::writer::StreamWriter;
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyCapsule, PyDict, PyString};
+use pyo3::types::{PyBytes, PyCapsule, PyDict, PyIterator, PyList, PyString};
 
 use crate::column::{Column, bytes_of};
 use crate::errors;
@@ -26,6 +26,7 @@ use crate::errors;
 ///
 /// What a column means, in which unit and in which space, is its metadata: see ``columns``.
 #[pyclass(frozen, module = "open_structure")]
+#[derive(Clone)]
 pub(crate) struct Table {
     name: String,
     batch: RecordBatch,
@@ -34,6 +35,10 @@ pub(crate) struct Table {
 impl Table {
     pub(crate) fn new(name: &str, batch: RecordBatch) -> Self {
         Self { name: name.to_owned(), batch }
+    }
+
+    pub(crate) fn rows(&self) -> usize {
+        self.batch.num_rows()
     }
 
     /// A column as an array of numpy.
@@ -164,8 +169,13 @@ impl Table {
         }
     }
 
-    fn __contains__(&self, column: &str) -> bool {
-        self.batch.column_by_name(column).is_some()
+    fn __contains__(&self, column: &Bound<'_, PyAny>) -> bool {
+        column.extract::<String>().is_ok_and(|column| self.batch.column_by_name(&column).is_some())
+    }
+
+    /// The names of the columns, as of a mapping.
+    fn __iter__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyIterator>> {
+        PyList::new(py, self.column_names())?.try_iter()
     }
 
     /// The schema as an ``arrow_schema`` capsule.

@@ -8,6 +8,7 @@ use pyo3::prelude::*;
 
 use crate::arguments::{Given, choice};
 use crate::errors;
+use crate::estimate;
 use crate::sequence::Sequence;
 use crate::work;
 
@@ -29,7 +30,7 @@ enum SensorName {
 /// * ``classic``: the paper's plain variant.
 /// * ``sensor``: ``monocular``, ``stereo`` or ``rgbd``; by default what the measurements have.
 /// * ``baseline``: distance of the two cameras of ``stereo``, metres.
-/// * ``first_pose``: ``world_from_camera`` of the first frame, seven numbers tx, ty, tz, qx, qy, qz, qw; by default its true
+/// * ``first_pose``: ``world_from_camera`` of the first frame, a matrix (4, 4) or seven numbers tx, ty, tz, qx, qy, qz, qw; by default its true
 ///   one where the sequence has it, else the identity.
 /// * ``seed``: seed of random samples.
 /// * ``name``: name of the estimate; by default that of the method, with ``-classic`` for ``classic``.
@@ -44,7 +45,7 @@ pub(crate) fn track(
     classic: bool,
     sensor: Option<&str>,
     baseline: Option<f64>,
-    first_pose: Option<[f64; 7]>,
+    first_pose: Option<&Bound<'_, PyAny>>,
     seed: u64,
     name: Option<String>,
     replace: bool,
@@ -64,7 +65,8 @@ pub(crate) fn track(
         (Some(SensorName::Rgbd), None) => Some(Sensor::Rgbd),
         (None, None) => None,
     };
-    let first_pose = first_pose.map(|[tx, ty, tz, qx, qy, qz, qw]| {
+    let first_pose = first_pose.map(|given| {
+        let [tx, ty, tz, qx, qy, qz, qw] = estimate::pose("first_pose", given)?;
         Pose::from_components([tx, ty, tz], [qx, qy, qz, qw])
             .map_err(|cause| errors::option(format!("first_pose: {cause}")))
     });

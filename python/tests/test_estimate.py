@@ -106,6 +106,9 @@ def test_hostile_rows_are_refused(tracked: Sequence) -> None:
         (7, "expected a column frame_id, found int"),
         (([], np.zeros((0, 7))), "without poses"),
         (None, "without poses"),
+        ((ids, np.ma.array(matrices, mask=changed((4, 0, 0), 9.0) == 9.0)), "poses: expected rows without masked numbers"),
+        ((np.ma.array(ids, mask=ids == 3), matrices), "poses: ids: expected rows without masked numbers"),
+        ({"frame_id": [0, 1], "estimate": ["a", "b"]}, "poses: expected rows of one estimate, found a, b"),
     ]
     for poses, message in wrong:
         with pytest.raises((open_structure.OptionError, open_structure.StepError), match=message):

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import multiprocessing
 import operator
 import pickle
 import shutil
+from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
@@ -30,6 +32,9 @@ def test_what_is_said_of_a_sequence(stored: str, request: pytest.FixtureRequest)
     assert sequence.tables[0] == "frames"
     assert "point_measurements" in sequence
     assert "graph_poses" not in sequence
+    assert 3 not in sequence
+    with pytest.raises(KeyError):
+        sequence["points"]
     assert repr(sequence) == f"<Sequence sphere2 at {path}>"
 
 
@@ -201,8 +206,40 @@ def test_sequences_and_tables_can_be_sent_to_other_processes(
         assert again.path == path
         nothing = sequence["graph_poses"]
         assert pickle.loads(pickle.dumps(nothing)).to_pyarrow().equals(nothing.to_pyarrow(), check_metadata=True)
+        frame = sequence.frames[17]
+        sent = pickle.loads(pickle.dumps(frame))
+        assert (sent.frame_id, sent.stamp_nanos, sent.camera_id) == (17, frame.stamp_nanos, 0)
+        np.testing.assert_array_equal(sent.world_from_camera, frame.world_from_camera)
+        for rows in ("point_measurements", "line_measurements", "point_observations", "line_observations"):
+            assert getattr(sent, rows).to_pyarrow().equals(getattr(frame, rows).to_pyarrow())
+        assert repr(sent) == repr(frame)
+        assert pickle.loads(pickle.dumps(sent)).frame_id == 17
     with pytest.raises(TypeError, match="send what `write` gives"):
         pickle.dumps(simulated)
+    assert copy.deepcopy(simulated) is copy.copy(simulated) is simulated
+
+
+def test_a_sequence_stays_where_it_is(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder.parent)
+    sequence = open_structure.Sequence.open(folder.name)
+    monkeypatch.chdir(tmp_path)
+    assert pickle.loads(pickle.dumps(sequence)).path == sequence.path == folder
+    with pytest.raises(open_structure.OptionError, match="is the input itself"):
+        sequence.write(folder, force=True)
+    assert sequence.write(folder.name).path == tmp_path / folder.name
+
+
+def test_frames_look_like_a_list(mcap: Path) -> None:
+    frames = open_structure.Sequence.open(mcap).frames
+
+    def ids(some: Iterable[open_structure.Frame]) -> list[int]:
+        return [frame.frame_id for frame in some]
+
+    for part in (slice(3), slice(-3, None), slice(90, 10, -20), slice(5, 5), slice(None, None, 33), slice(-200, 200, 50)):
+        assert ids(frames[part]) == list(range(100))[part]
+    assert ids(reversed(frames)) == list(range(99, -1, -1))
+    with pytest.raises(TypeError):
+        frames["first"]
 
 
 def test_exceptions_can_be_sent_elsewhere() -> None:

@@ -85,7 +85,7 @@ def test_recipes_that_are_none(tmp_path: Path) -> None:
         {"noise": "gaussian", "seed": 7, "set": {"sigma_px": 0.5}},
         {"noise": "kinect-disparity", "quantise": 1, "outliers": 0.05, "missed": 0.1, "drop_outside": True},
         {"noise": "first-release", "keep_depth": True},
-        {"noise": "paper", "complete_depths": True, "seed": 2},
+        {"noise": "paper", "complete_depths": True, "seed": 2, "name": "sphere2-paper"},
     ],
 )
 def test_measure(options: dict[str, Any], folder: Path, tmp_path: Path, run: Run) -> None:
@@ -203,6 +203,10 @@ def test_options_that_have_no_meaning(tracked: Sequence, simulated: Sequence) ->
         (open_structure.track, {}, "an estimate `map-to-frame` already"),
         (open_structure.track, {"name": ""}, "is empty"),
         (open_structure.track, {"name": "truth"}, "stands for the true poses"),
+        (open_structure.track, {"name": "line\nbreak"}, "has a control character"),
+        (open_structure.track, {"first_pose": [1, 2, 3]}, "first_pose: expected seven numbers or a matrix (4, 4)"),
+        (open_structure.evaluate, {"align_first": 0}, "align_first: expected a whole number over zero"),
+        (open_structure.evaluate, {"estimate": []}, "estimate: expected a name, found none"),
         (open_structure.graph, {"most_shared": 0.5}, "go with key_frames"),
         (open_structure.graph, {"min_views": 0}, "min_views: expected a whole number over zero"),
         (open_structure.graph, {"estimate": "none"}, "expected an estimate with a trajectory, none, found map-to-frame"),

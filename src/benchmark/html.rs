@@ -29,7 +29,7 @@ pub fn html(results: &Results, label: &str, pictures: &[(String, String)]) -> St
     if !label.is_empty() {
         page += &format!("<p>{}</p>\n", escaped(label));
     }
-    page += "<h2>Absolute error of translation</h2>\n<p>RMSE after SE(3) alignment, cm: median over seeds (quartiles). Below it the ratio to the bound, which is the error that the measurements allow, and the paper's figure. Bold: the least of a sequence.</p>\n";
+    page += "<h2>Absolute error of translation</h2>\n<p>RMSE after SE(3) alignment, cm: median over seeds (quartiles). Below it the ratio to the bound, which is the error that what the method reads allows (of methods without depth both after an alignment that scales), and what the paper prints for its own method of that kind. Bold: the least of a sequence.</p>\n";
     page += &table(results);
     page += "<h2>Rotation and time</h2>\n<p>Relative error of rotation, delta 1 frame, RMSE in degrees, and wall time in seconds; medians over seeds.</p>\n";
     page += &rotations(results);

@@ -57,7 +57,7 @@ pub(super) struct Args {
     #[arg(short = 's', conflicts_with = "align")]
     scale: bool,
     /// Align over the first N matched poses alone.
-    #[arg(long, value_name = "N", alias = "n_to_align")]
+    #[arg(long, value_name = "N", alias = "n_to_align", value_parser = parsed::at_least_one)]
     align_first: Option<usize>,
     /// Show all statistics of this relation; may be given several times.
     #[arg(short, long, value_enum, value_name = "RELATION")]

@@ -96,6 +96,9 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     if args.form != Form::AsItIs && args.to != Format::G2o {
         bail!("--form goes with --to g2o");
     }
+    if args.to == Format::Rerun && args.output.extension().is_none_or(|ending| ending != "rrd") {
+        bail!("{}: expected a name that ends in .rrd", args.output.display());
+    }
     let given = [("--graph", args.graph.is_some()), ("--estimate", args.estimate.is_some())];
     let takes = match args.to {
         Format::Tum | Format::Kitti | Format::Euroc => &["--estimate"][..],

@@ -20,7 +20,8 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome> {
-    let mut command = program();
+    // What `os help` says stands in the pages themselves.
+    let mut command = program().disable_help_subcommand(true);
     command.build();
     let Some(folder) = &args.output else {
         let mut page = Vec::new();

@@ -44,6 +44,7 @@ Examples:
   os measure box1 -o noisy.mcap --noise gaussian --seed 7 --set sigma_px=0.5
   os measure box1.mcap -o kinect/ --noise kinect-disparity --quantise 1 --outliers 0.05
   os measure box1.mcap -o runs/box1.mcap --noise paper --seeds 0..9
+  os measure box1 -o all/box1 --noise paper --seeds 0..9 --name box1-paper; os index all --adopt
   os measure box1 -o with-depth/box1 --complete-depths --noise first-release --seed 3")]
 #[expect(clippy::struct_excessive_bools, reason = "each is a flag of the command line")]
 pub(super) struct Args {
@@ -61,6 +62,10 @@ pub(super) struct Args {
     /// Several seeds, both ends included: `0..9` makes ten sequences, with the seed in their names (NAME-0.mcap).
     #[arg(long, value_name = "A..B", conflicts_with = "seed", value_parser = seeds)]
     seeds: Option<RangeInclusive<u64>>,
+    /// Name of the sequence [default: that of the input]; with --seeds each seed is added to it (NAME-0), so that all can lie in
+    /// one collection.
+    #[arg(long)]
+    name: Option<String>,
     /// A parameter of the model or an option, by the registry's name; may be given several times.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
     set: Vec<(String, f64)>,
@@ -130,6 +135,15 @@ impl Args {
         Ok(recipe)
     }
 
+    /// What is asked for with one seed.
+    fn request(&self, recipe: &NoiseRecipe, seed: u64) -> MeasureRequest {
+        let name = self.name.as_ref().map(|name| match &self.seeds {
+            Some(_) => format!("{name}-{seed}"),
+            None => name.clone(),
+        });
+        MeasureRequest { recipe: recipe.clone(), seed, keep_estimates: self.keep_estimates, name }
+    }
+
     /// Each output with its seed.
     fn outputs(&self) -> Vec<(u64, PathBuf)> {
         match &self.seeds {
@@ -157,6 +171,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     let reader = format::open(&args.sequence)?;
     let outputs = args.outputs();
     check_outputs(&outputs, args)?;
+    args.request(&recipe, args.seed).check_name()?;
     if args.complete_depths {
         return complete_depths(args, &recipe, &outputs, stdout);
     }
@@ -222,8 +237,7 @@ fn complete_depths(
         tell_dropped(&format::open(&args.sequence)?)?;
     }
     for (seed, path) in outputs {
-        let request =
-            MeasureRequest { recipe: recipe.clone(), seed: *seed, keep_estimates: args.keep_estimates };
+        let request = args.request(recipe, *seed);
         let (sequence, done) = stations::complete_depths(&input, &request)
             .with_context(|| args.sequence.display().to_string())?;
         format::write(path, &sequence, WriteOptions { force: args.force, ..WriteOptions::default() })?;
@@ -291,7 +305,7 @@ fn begin(
     let groups: Vec<StructuralGroup> = reader.table()?;
     let mut realisations = Vec::new();
     for (seed, path) in outputs {
-        let manifest = stations::measured_manifest(reader.manifest(), recipe, *seed, args.keep_estimates);
+        let manifest = stations::measured_manifest(reader.manifest(), &args.request(recipe, *seed));
         let options = WriteOptions { force: args.force, ..WriteOptions::default() };
         let writer = SequenceWriter::create(path, &manifest, frames, options)?;
         realisations.push(Realisation::new(writer, &manifest, &groups));

@@ -184,3 +184,13 @@ fn is_broken_pipe(error: &anyhow::Error) -> bool {
 fn program() -> clap::Command {
     Cli::command()
 }
+
+/// Ends the program as clap does where a command's arguments do not go together.
+fn misused(command: &str, kind: clap::error::ErrorKind, words: &str) -> ! {
+    let mut program = program();
+    program.build();
+    match program.find_subcommand_mut(command) {
+        Some(command) => command.error(kind, words).exit(),
+        None => program.error(kind, words).exit(),
+    }
+}

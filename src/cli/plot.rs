@@ -13,7 +13,7 @@ use super::plot_options::{
     AlignName, Figure, FigureFile, FileFormat, FrameIds, Over, ThemeName, View, dots_per_inch, figure_file,
     font_pt, frame_ids, millimetres, width_mm,
 };
-use super::{Outcome, evaluate_output, inputs, parsed, plot_compared, plot_figures, program, text};
+use super::{Outcome, evaluate_output, inputs, misused, parsed, plot_compared, plot_figures, text};
 use crate::format::Partial;
 use crate::plot::ViewFrom;
 use crate::plot::paper::{Look, PaperFigure};
@@ -73,9 +73,9 @@ pub(super) struct Args {
     /// Size of letters, points.
     #[arg(long, value_name = "PT", default_value = "8", value_parser = font_pt)]
     font_size: f64,
-    /// Dots per inch of a PNG.
-    #[arg(long, value_name = "DPI", default_value = "600", value_parser = dots_per_inch)]
-    dpi: f64,
+    /// Dots per inch of a PNG [default: 600].
+    #[arg(long, value_name = "DPI", value_parser = dots_per_inch)]
+    dpi: Option<f64>,
     /// What it is drawn on.
     #[arg(long, value_enum, default_value_t = ThemeName::Light)]
     theme: ThemeName,
@@ -94,16 +94,20 @@ pub(super) struct Args {
     /// Draw only this estimate; may be given several times.
     #[arg(long, value_name = "NAME")]
     estimate: Vec<String>,
-    /// What may be moved to lay estimates on the truth.
-    #[arg(long, value_enum, value_name = "KIND", default_value_t = AlignName::Se3)]
-    align: AlignName,
-    /// What absolute errors are drawn over.
-    #[arg(long, value_enum, default_value_t = Over::Path)]
-    over: Over,
+    /// What may be moved to lay estimates on the truth [default: se3].
+    #[arg(long, value_enum, value_name = "KIND")]
+    align: Option<AlignName>,
+    /// What absolute errors are drawn over [default: path].
+    #[arg(long, value_enum)]
+    over: Option<Over>,
     /// Replace the output if it exists.
     #[arg(long)]
     force: bool,
 }
+
+/// Dots per inch of a PNG.
+#[cfg(feature = "figures")]
+const DPI: f64 = 600.0;
 
 /// What a figure is made of: inputs, and what was asked for.
 pub(super) struct Wanted<'a> {
@@ -142,6 +146,7 @@ impl Wanted<'_> {
 pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome> {
     let (figure, inputs) = args.figure();
     let FigureFile { path: output, format } = &args.output;
+    args.refuse_idle(figure, *format);
     evaluate_output::refuse_input(output, inputs)?;
     let inputs = &inputs::sequences(inputs)?;
     // Reserved before the work begins.
@@ -153,8 +158,8 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         wide: args.width > 110.0,
         frames: args.frames.as_ref(),
         estimates: &args.estimate,
-        align: args.align,
-        over: args.over,
+        align: args.align.unwrap_or(AlignName::Se3),
+        over: args.over.unwrap_or(Over::Path),
         view: args.view,
         azimuth: args.azimuth,
         elevation: args.elevation,
@@ -172,7 +177,7 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         #[cfg(feature = "figures")]
         FileFormat::Pdf => crate::plot::paper::pdf(&svg, &drawn.title)?,
         #[cfg(feature = "figures")]
-        FileFormat::Png => crate::plot::paper::png(&svg, args.dpi)?,
+        FileFormat::Png => crate::plot::paper::png(&svg, args.dpi.unwrap_or(DPI))?,
         #[cfg(not(feature = "figures"))]
         FileFormat::Pdf | FileFormat::Png => {
             anyhow::bail!("{}: built without the feature `figures`", output.display())
@@ -205,6 +210,32 @@ fn draw(wanted: &Wanted<'_>) -> anyhow::Result<(PaperFigure, Outcome)> {
 }
 
 impl Args {
+    /// Refuses options that change nothing about a figure.
+    fn refuse_idle(&self, figure: Figure, format: FileFormat) {
+        use Figure as F;
+        let of_estimates = matches!(figure, F::Trajectories | F::Xyz | F::Rpy | F::Ape | F::ApeMap | F::Rpe);
+        let is_seen = matches!(figure, F::Scene | F::Trajectories | F::ApeMap);
+        let options = [
+            ("--frames", self.frames.is_some(), figure == F::Measurements),
+            ("--estimate", !self.estimate.is_empty(), of_estimates || figure == F::Convergence),
+            ("--align", self.align.is_some(), of_estimates),
+            ("--over", self.over.is_some(), figure == F::Ape),
+            ("--view", self.view.is_some(), is_seen),
+            ("--azimuth", self.azimuth.is_some(), is_seen),
+            ("--elevation", self.elevation.is_some(), is_seen),
+            ("--columns", self.columns.is_some(), !matches!(figure, F::Xyz | F::Rpy)),
+        ];
+        for (option, is_given, has_effect) in options {
+            if is_given && !has_effect {
+                let words = format!("{option} does not go with the figure {}", figure.name());
+                misused("plot", ErrorKind::ArgumentConflict, &words);
+            }
+        }
+        if self.dpi.is_some() && format != FileFormat::Png {
+            misused("plot", ErrorKind::ArgumentConflict, "--dpi goes with a file that ends in .png");
+        }
+    }
+
     /// The figure and its inputs: the first of several arguments is a figure if it is the name of one.
     fn figure(&self) -> (Figure, &[PathBuf]) {
         let named = self.inputs.first().and_then(|first| Figure::named(first));
@@ -213,7 +244,7 @@ impl Args {
             (None, Some(figure), [_, inputs @ ..]) if !inputs.is_empty() => (figure, inputs),
             (None, Some(figure), [first]) if !storage::exists(first) => {
                 let words = format!("{}: expected a sequence after the figure's name", figure.name());
-                program().error(ErrorKind::MissingRequiredArgument, words).exit()
+                misused("plot", ErrorKind::MissingRequiredArgument, &words)
             }
             (None, None, [first, _, ..]) if !storage::exists(first) && first.extension().is_none() => {
                 let known = Figure::value_variants().iter().map(|figure| figure.name()).collect::<Vec<_>>();
@@ -222,7 +253,7 @@ impl Args {
                     first.display(),
                     known.join(", ")
                 );
-                program().error(ErrorKind::InvalidValue, words).exit()
+                misused("plot", ErrorKind::InvalidValue, &words)
             }
             (None, _, inputs) => (Figure::Scene, inputs),
         }

@@ -51,14 +51,14 @@ pub(super) fn figure(wanted: &Wanted<'_>, problems: &mut Vec<String>) -> anyhow:
             ("Angles over time", panels, columns)
         }
         Figure::Ape => {
-            let panels =
-                all.iter().map(|compared| compared.ape(wanted)).collect::<anyhow::Result<Vec<_>>>()?;
+            let panels = absolute_errors(wanted, &all)?;
             let columns = wanted.columns(panels.len(), 1, 2);
             ("Absolute errors", panels, columns)
         }
         Figure::ApeMap => {
             let panels = ape_maps(wanted, &all)?;
-            let columns = wanted.columns(panels.len(), 1, 2);
+            // More than two over each other would be higher than a page.
+            let columns = wanted.columns(panels.len(), if panels.len() > 2 { 2 } else { 1 }, 2);
             ("Paths and their absolute errors", panels, columns)
         }
         Figure::Rpe => {
@@ -86,9 +86,6 @@ fn stacked(
     names: [&str; 3],
     first: usize,
 ) -> anyhow::Result<(Vec<Panel>, usize)> {
-    if wanted.columns.is_some() {
-        anyhow::bail!("--columns: {} has its charts over each other", wanted.figure.name());
-    }
     let columns = match all.len() {
         2 | 3 if wanted.wide => all.len(),
         count if wanted.wide && count % 2 == 0 => 2,
@@ -117,6 +114,22 @@ fn stacked(
         }
     }
     Ok((panels, columns))
+}
+
+/// Absolute errors of each sequence, all in one unit and on one kind of scale.
+fn absolute_errors(wanted: &Wanted<'_>, all: &[Compared]) -> anyhow::Result<Vec<Panel>> {
+    let found: Vec<_> = all.iter().map(Compared::absolute).collect::<anyhow::Result<_>>()?;
+    let each = || found.iter().flatten().map(|(_, absolute)| *absolute);
+    let unit = LengthUnit::of(each().map(largest).fold(0.0, f64::max));
+    let medians = || each().map(|absolute| absolute.translation.median() * unit.per_metre);
+    let [least, most] = [medians().fold(f64::INFINITY, f64::min), medians().fold(0.0, f64::max)];
+    // Errors far under the usual ones would take the room of the others.
+    let y = if least > 0.0 && most > FAR_APART * least {
+        Scale::LogarithmicFrom(0.1 * least)
+    } else {
+        Scale::FromZero
+    };
+    Ok(all.iter().zip(&found).map(|(compared, found)| compared.ape(wanted, found, &unit, y)).collect())
 }
 
 /// A path for each estimate, coloured by its errors.
@@ -309,17 +322,13 @@ impl Compared {
     }
 
     /// Absolute errors along the path or over time.
-    fn ape(&self, wanted: &Wanted<'_>) -> anyhow::Result<Panel> {
-        let found = self.absolute()?;
-        let unit = LengthUnit::of(found.iter().map(|(_, absolute)| largest(absolute)).fold(0.0, f64::max));
-        let medians = || found.iter().map(|(_, absolute)| absolute.translation.median() * unit.per_metre);
-        let [least, most] = [medians().fold(f64::INFINITY, f64::min), medians().fold(0.0, f64::max)];
-        // Errors far under the usual ones would take the room of the others.
-        let y = if least > 0.0 && most > FAR_APART * least {
-            Scale::LogarithmicFrom(0.1 * least)
-        } else {
-            Scale::FromZero
-        };
+    fn ape(
+        &self,
+        wanted: &Wanted<'_>,
+        found: &[(&ComparedEstimate, &Absolute<FrameId>)],
+        unit: &LengthUnit,
+        y: Scale,
+    ) -> Panel {
         let along = wanted.over == Over::Path;
         let curve = |(estimate, absolute): &(&ComparedEstimate, &Absolute<FrameId>)| {
             let errors = absolute.translation.values().iter().map(|error| error * unit.per_metre);
@@ -342,7 +351,7 @@ impl Compared {
             colour_bar: None,
             curves: found.iter().map(curve).collect(),
         });
-        Ok(Panel { caption: Some(self.name.clone()), content })
+        Panel { caption: Some(self.name.clone()), content }
     }
 
     /// Histograms of relative errors of translation and of rotation.

@@ -10,8 +10,8 @@ use super::stats;
 use crate::format::{self, SequenceReader};
 use crate::plot::Scene;
 use crate::plot::paper::{
-    BarKind, Bars, Chart, Content, Curve, Drawn, MeasurementImage, Panel, PaperFigure, Role, Scale,
-    SceneView, group_ranks,
+    BarKind, Bars, Chart, Content, Curve, Drawn, MeasurementImage, Panel, PaperFigure, RankedGroups, Role,
+    Scale, SceneView,
 };
 use crate::report::Run;
 use crate::statistics::{Analysed, FeatureStatistics, SequenceStatistics};
@@ -260,7 +260,7 @@ pub(super) fn measurements(wanted: &Wanted<'_>) -> anyhow::Result<PaperFigure> {
     let mut panels = Vec::new();
     for path in wanted.inputs {
         let reader = format::open(path)?;
-        let rank_of = group_ranks(&reader.table::<StructuralGroup>()?);
+        let groups = RankedGroups::of(&reader.table::<StructuralGroup>()?);
         for frame_id in chosen_frames(wanted, path, &reader)? {
             let frame = reader.frame(frame_id)?;
             let frame =
@@ -271,7 +271,7 @@ pub(super) fn measurements(wanted: &Wanted<'_>) -> anyhow::Result<PaperFigure> {
             })?;
             let of_input =
                 if wanted.inputs.len() > 1 { format!("{}, ", plot::caption(path)) } else { String::new() };
-            let content = Content::Image(MeasurementImage::of(camera, &frame, &rank_of));
+            let content = Content::Image(MeasurementImage::of(camera, &frame, &groups));
             panels.push(Panel { caption: Some(format!("{of_input}{frame_id}")), content });
         }
     }

@@ -30,18 +30,22 @@ pub(super) struct Args {
     #[arg(required = true, value_name = "INPUT")]
     inputs: Vec<PathBuf>,
     /// Output: an HTML file.
-    #[arg(short, long, value_name = "FILE.html")]
+    #[arg(short, long, value_name = "FILE.html", value_parser = html_file)]
     output: PathBuf,
     /// Replace the output if it exists.
     #[arg(long)]
     force: bool,
 }
 
+/// The file of a report.
+fn html_file(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    let is_html = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("html"));
+    if is_html { Ok(path) } else { Err("expected a name that ends in .html".to_owned()) }
+}
+
 pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome> {
     let output = &args.output;
-    if output.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("html")) {
-        anyhow::bail!("{}: expected a name that ends in .html", output.display());
-    }
     evaluate_output::refuse_input(output, &args.inputs)?;
     // Reserved before the work begins.
     let partial = Partial::file(output, args.force)?;

@@ -30,6 +30,20 @@ pub enum Error {
         /// The path.
         path: PathBuf,
     },
+    /// Two folders of a collection hold sequences of one name.
+    #[error(
+        "{} and {}: both hold a sequence called `{name}`; expected a name for each (os measure --name gives one)",
+        first.display(),
+        second.display()
+    )]
+    OneName {
+        /// The name.
+        name: String,
+        /// One of them.
+        first: PathBuf,
+        /// The other.
+        second: PathBuf,
+    },
     /// What is there is not of the kind that would take its place, and so may be dear to somebody.
     #[error("{}: expected {expected} to replace, found {found}; use another name", path.display())]
     NotReplaced {

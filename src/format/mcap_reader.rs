@@ -332,6 +332,9 @@ impl Iterator for Messages {
     }
 }
 
+/// Said of a file without its end.
+pub(super) const CUT_SHORT: &str = "the closing magic bytes are missing; was the file cut short?";
+
 /// Refuses an index whose chunks would not fit into the file, or would take much more memory than files do.
 fn check_chunks(path: &Path, summary: &Summary, length: u64) -> Result<(), Error> {
     let too_large =
@@ -360,11 +363,9 @@ fn read_summary(file: &CountedFile) -> Result<Summary, Error> {
     let path = file.path();
     let failed = |error: mcap::McapError| match error {
         // Those at the beginning are looked at below.
-        mcap::McapError::BadMagic => Error::Container {
-            path: path.to_owned(),
-            container: "MCAP",
-            detail: "the closing magic bytes are missing; was the file cut short?".to_owned(),
-        },
+        mcap::McapError::BadMagic => {
+            Error::Container { path: path.to_owned(), container: "MCAP", detail: CUT_SHORT.to_owned() }
+        }
         error => Error::container(path, "MCAP")(error.into()),
     };
     let mut magic = [0; 8];

@@ -8,7 +8,7 @@ use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOp
 
 use super::counted_file::CountedFile;
 use super::guard::guarded;
-use super::mcap_reader::{MAX_CHUNK_BYTES, MAX_CHUNK_RATIO};
+use super::mcap_reader::{CUT_SHORT, MAX_CHUNK_BYTES, MAX_CHUNK_RATIO};
 use super::{Error, names};
 
 /// Most faults of a kind that are kept in words; the rest is only counted.
@@ -87,6 +87,13 @@ struct Tally {
     statistics: Option<Statistics>,
 }
 
+/// Whether the closing magic bytes are there.
+fn ends_as_mcap(file: &CountedFile) -> bool {
+    let end = file.length().checked_sub(mcap::MAGIC.len() as u64);
+    end.and_then(|end| file.read_exact_at(end, mcap::MAGIC.len()).ok())
+        .is_some_and(|bytes| *bytes == *mcap::MAGIC)
+}
+
 impl McapSurvey {
     pub(super) fn read(file: &CountedFile) -> Self {
         let (mut survey, mut tally) = (Self::default(), Tally::default());
@@ -99,6 +106,9 @@ impl McapSurvey {
         });
         if let Err(error) = walked {
             survey.complete = false;
+            if !ends_as_mcap(file) {
+                survey.unreadable.add(|| CUT_SHORT.to_owned());
+            }
             survey.unreadable.add(|| error.detail());
         }
         survey.sections(file);

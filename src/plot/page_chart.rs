@@ -17,6 +17,8 @@ const HIGH: f64 = HEIGHT - TOP - 44.0;
 const MOST_PLACES: usize = 600;
 /// How wide a character is at most on average.
 const CHARACTER: f64 = 7.4;
+/// The same of letters that are a size smaller.
+const TIGHT_CHARACTER: f64 = 6.3;
 
 /// How numbers are laid out along the upward axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,9 +75,12 @@ pub fn page_chart(title: &str, x_name: &str, upward: Upward, curves: &[PageCurve
     let x = Axis::linear(left, right);
     let data = format!(" data-area=\"{LEFT} {TOP} {ACROSS} {HIGH}\" data-x=\"{left} {right}\"");
     let mut svg = opened(title, &data);
-    upward_grid(&mut svg, &y);
+    let counted = upward == Upward::FromZero && all().all(|place| place[1].fract() == 0.0);
+    upward_grid(&mut svg, &y, counted);
     let mut free_from = f64::MIN;
-    for tick in x.ticks() {
+    // What is counted has no parts: a frame, a step.
+    let whole = all().all(|place| place[0].fract() == 0.0);
+    for tick in x.ticks().into_iter().filter(|tick| !whole || tick.number.fract() == 0.0) {
         let Some(place) = x.place(tick.number) else { continue };
         let half = 0.5 * CHARACTER * tick.words.chars().count() as f64;
         let at = LEFT + ACROSS * place;
@@ -120,16 +125,24 @@ pub fn page_bars(title: &str, x_name: &str, categories: &[String], kinds: &[Page
     let most = bounds(kinds.iter().flat_map(|kind| kind.heights.iter().copied()));
     let y = Axis::from_zero(most.map_or(1.0, |[_, high]| high));
     let mut svg = opened(title, "");
-    upward_grid(&mut svg, &y);
+    let whole = kinds.iter().flat_map(|kind| kind.heights).all(|height| height.fract() == 0.0);
+    upward_grid(&mut svg, &y, whole);
     let room = ACROSS / categories.len().max(1) as f64;
+    // Letters that are a size smaller, where names would touch.
+    let longest = categories.iter().map(|name| name.chars().count()).max().unwrap_or(0);
+    let tight = CHARACTER * longest as f64 + 4.0 > room;
+    let character = if tight { TIGHT_CHARACTER } else { CHARACTER };
+    if tight {
+        svg += "<g class=\"tight\">";
+    }
     let width = (0.8 * room / kinds.len().max(1) as f64).min(40.0);
     let mut free_from = f64::MIN;
     for (place, category) in categories.iter().enumerate() {
         let middle = LEFT + room * (place as f64 + 0.5);
-        let half = 0.5 * CHARACTER * category.chars().count() as f64;
+        let half = 0.5 * character * category.chars().count() as f64;
         if middle - half > free_from {
             under(&mut svg, middle, "middle", category);
-            free_from = middle + half + 4.0;
+            free_from = middle + half + 2.0;
         }
         for (index, kind) in kinds.iter().enumerate() {
             let Some(part) = kind.heights.get(place).and_then(|height| y.place(*height)) else { continue };
@@ -142,6 +155,9 @@ pub fn page_bars(title: &str, x_name: &str, categories: &[String], kinds: &[Page
                 width - 1.5
             );
         }
+    }
+    if tight {
+        svg += "</g>";
     }
     closed(svg, x_name)
 }
@@ -167,8 +183,10 @@ fn closed(mut svg: String, x_name: &str) -> String {
 }
 
 /// Lines across, each with its number at the left.
-fn upward_grid(svg: &mut String, y: &Axis) {
-    for tick in y.ticks() {
+///
+/// * `whole` — whether only whole numbers have one.
+fn upward_grid(svg: &mut String, y: &Axis, whole: bool) {
+    for tick in y.ticks().into_iter().filter(|tick| !whole || tick.number.fract() == 0.0) {
         let Some(place) = y.place(tick.number).filter(|place| (-0.001..=1.001).contains(place)) else {
             continue;
         };

@@ -15,8 +15,10 @@ pub(super) fn section(rows: &[BenchmarkRow], runs: &BTreeMap<String, Vec<Run>>) 
             h2 id="benchmark" { "Benchmark" }
             h3 { "Absolute error of translation" }
             p.note {
-                "RMSE after SE(3) alignment, cm: median over seeds, and quartiles. Below it how many times the bound that the "
-                "measurements allow, and what the paper prints. Bold: the least of a sequence."
+                "RMSE after SE(3) alignment, cm: median over seeds, and quartiles. Below it how many times the bound, which is the error that "
+                "what the method reads allows; of methods without depth both are taken after an alignment that scales, for nothing tells them "
+                "the scale. Below 1 a method uses more than measurements, such as how a camera moves. Last, what the paper prints for its own "
+                "method of that kind. Bold: the least of a sequence."
             }
             (pivot(rows, "Absolute error of translation", |row, best| html! {
                 @match row.ape_rmse_cm {

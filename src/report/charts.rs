@@ -3,7 +3,7 @@
 use maud::{Markup, PreEscaped, html};
 
 /// Colours of estimates, and dashes for those beyond.
-const COLOURS: usize = 6;
+const COLOURS: usize = 5;
 const DASHES: usize = 4;
 /// Longest name in a legend, characters; the whole one stands in its tooltip.
 const LONGEST_NAME: usize = 40;

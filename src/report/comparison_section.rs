@@ -313,11 +313,9 @@ pub(super) fn convergence(runs: &[Run], title: &str) -> Markup {
             .iter()
             .map(|(_, run)| {
                 let costs = run.accepted();
-                // Where the cost rises, another problem begins, and the costs of the last one are what counts.
-                let last = (1..costs.len()).rev().find(|step| costs[*step] > costs[*step - 1]).unwrap_or(0);
-                let lowest = costs[last..].iter().copied().fold(f64::INFINITY, f64::min);
-                // The lowest itself has no place over powers of ten.
-                let number = |cost: f64| if lowered { cost - lowest } else { cost };
+                let end = costs.last().copied().unwrap_or_default();
+                // The end itself has no place over powers of ten.
+                let number = |cost: f64| if lowered { cost - end } else { cost };
                 (0..).map(f64::from).zip(costs).map(|(step, cost)| [step, number(cost)]).collect()
             })
             .collect();
@@ -342,7 +340,7 @@ pub(super) fn convergence(runs: &[Run], title: &str) -> Markup {
         rows: rows.collect(),
         note: None,
     };
-    let above = "What is above the lowest cost";
+    let above = "Above the cost at the end";
     let figures = [
         Figure {
             title,
@@ -354,7 +352,7 @@ pub(super) fn convergence(runs: &[Run], title: &str) -> Markup {
         },
         Figure {
             title: above,
-            note: "The cost less the lowest of the same optimiser: how fast each comes to its end. Where a cost rises, the optimiser has changed the problem, such as by what it takes for a mismatch, and begins anew; what lies below the end has no place here.",
+            note: "The cost less that with which the same optimiser ended: how fast each comes to its end. Where a cost rises, the optimiser has changed the problem, such as by what it takes for a mismatch, and begins anew; costs of before that lie below the end have no place here.",
             cursor: None,
             svg: svg(above, true),
             legend: &legend,

@@ -88,17 +88,19 @@ fn toggles(report: &SequenceReport) -> Markup {
     html! {
         fieldset.toggles.needs-script hidden {
             legend.sr { "Shown in the scene" }
-            (toggle("points", "swatch dot quiet", html! { "points" }))
+            @if report.landmarks.has_points() { (toggle("points", "swatch dot quiet", html! { "points" })) }
             @for (place, group) in view.groups().iter().enumerate() {
                 (toggle(&format!("group-{place}"), &format!("swatch group-{}", group.colour), html! {
                     (named(&group.name)) ": " (count(group.lines as u64))
                 }))
             }
-            (toggle("ungrouped", "swatch quiet", html! { "lines in no group" }))
+            @if report.has_ungrouped {
+                (toggle("ungrouped", "swatch quiet", html! { "lines in no group" }))
+            }
             @for (place, path) in view.paths().iter().enumerate() {
                 (toggle(&format!("path-{place}"), &format!("swatch {}", path.class), named(&path.name)))
             }
-            (toggle("rays", "swatch points", html! { "rays" }))
+            @if report.landmarks.has_points() { (toggle("rays", "swatch points", html! { "rays" })) }
             @if edges { (toggle("edges", "swatch faint", html! { "edges of objects" })) }
         }
     }

@@ -38,6 +38,9 @@ impl Input {
             let curves = storage::is_file(&curves).then(|| format::read_results(&curves)).transpose()?;
             return Ok(Self::Results(Box::new(Results::of_tables(path, &summary, curves.as_ref())?)));
         }
+        if is_stream(path) {
+            return Self::of_stream(path);
+        }
         let mut file = File::open(path).map_err(io)?;
         let mut begin = Vec::new();
         file.by_ref().take(64).read_to_end(&mut begin).map_err(io)?;
@@ -55,4 +58,22 @@ impl Input {
         file.take(MOST_JSON_BYTES).read_to_end(&mut begin).map_err(io)?;
         Ok(Self::Results(Box::new(Results::of_json(path, &begin)?)))
     }
+
+    /// Reads what another command prints meanwhile; a sequence cannot be read in one go.
+    fn of_stream(path: &Path) -> Result<Self, Error> {
+        let io = |cause| Error::Io { path: path.to_owned(), cause };
+        let mut bytes = Vec::new();
+        let file = std::fs::File::open(path).map_err(io)?;
+        file.take(MOST_JSON_BYTES + 1).read_to_end(&mut bytes).map_err(io)?;
+        if bytes.len() as u64 > MOST_JSON_BYTES {
+            let found = format!("over {MOST_JSON_BYTES} bytes of JSON");
+            return Err(Error::UnknownInput { path: path.to_owned(), found });
+        }
+        Ok(Self::Results(Box::new(Results::of_json(path, &bytes)?)))
+    }
+}
+
+/// Whether a path is a pipe, which is read once and from its beginning.
+fn is_stream(path: &Path) -> bool {
+    !storage::is_url(path) && path.metadata().is_ok_and(|about| !about.is_file() && !about.is_dir())
 }

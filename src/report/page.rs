@@ -105,7 +105,7 @@ fn contents(report: &Report) -> String {
         (report.sequences.len(), "sequence", "sequences"),
         (results.evaluations.len(), "evaluation", "evaluations"),
         (results.adjustments.len(), "adjustment", "adjustments"),
-        (results.benchmarks.len(), "cell of a benchmark", "cells of a benchmark"),
+        (results.benchmarks.len(), "row of a benchmark", "rows of a benchmark"),
     ];
     let there = counts.into_iter().filter(|(count, _, _)| *count > 0);
     let words: Vec<String> =
@@ -127,7 +127,12 @@ fn sequence(report: &SequenceReport, place: usize) -> Result<Markup, Error> {
     Ok(html! {
         article.sequence data-sequence=(place) aria-labelledby=(id("name")) {
             header {
-                h2 id=(id("name")) { (named(&report.manifest.name)) " " span class=(format!("badge {class}")) { (words) } }
+                h2 id=(id("name")) {
+                    (named(&report.manifest.name))
+                    // Several may be made of one sequence.
+                    @if report.file != report.manifest.name { " " small { (named(&report.file)) } }
+                    " " span class=(format!("badge {class}")) { (words) }
+                }
                 @if let Some(description) = &report.manifest.description { p { (description) } }
                 nav aria-label="Parts of the sequence" {
                     ul { @for (part, name, _) in &parts { li { a href=(format!("#{}", id(part))) { (name) } } } }

@@ -14,7 +14,7 @@ use crate::structure::{
 };
 
 /// Colours of groups; more groups than these begin again.
-pub(super) const GROUP_COLOURS: usize = 6;
+pub(super) const GROUP_COLOURS: usize = 15;
 /// What stands for a line in no group.
 const NO_GROUP: u16 = u16::MAX;
 /// Largest integer that a number of JavaScript holds exactly.
@@ -72,6 +72,16 @@ impl Landmarks {
             lines: lines.map(|row| (row.line_id.0, ends(&row.segment()))).collect(),
             instead: Some(format!("initial values of the factor graph {name}")),
         }
+    }
+
+    /// Whether there is a point.
+    pub(super) fn has_points(&self) -> bool {
+        !self.points.is_empty()
+    }
+
+    /// Whether there is a line that is not among some.
+    pub(super) fn has_lines_beside(&self, lines: &BTreeMap<LineId, usize>) -> bool {
+        self.lines.keys().any(|id| !lines.contains_key(&LineId(*id)))
     }
 
     /// Whether there is none.

@@ -43,6 +43,8 @@ pub struct SequenceReport {
     /// A picture of the scene, SVG, for where none can be drawn anew; `None` where nothing has a place.
     pub(super) still: Option<String>,
     pub(super) landmarks: Landmarks,
+    /// Whether a line is in no group.
+    pub(super) has_ungrouped: bool,
     pub(super) view: ViewData,
 }
 
@@ -90,6 +92,7 @@ impl SequenceReport {
         };
         let still = plot::scene_picture(&picture, ViewFrom::OBLIQUE).ok();
         let (shown_groups, places) = scene::groups(&groups);
+        let has_ungrouped = landmarks.has_lines_beside(&places);
         let mut paths = vec![(
             ViewPath { name: "ground truth".to_owned(), class: "truth".to_owned() },
             scene::true_path(&frames),
@@ -131,6 +134,7 @@ impl SequenceReport {
             comparison,
             validation,
             still,
+            has_ungrouped,
             landmarks,
             view,
         })

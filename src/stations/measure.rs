@@ -20,13 +20,25 @@ pub struct MeasureRequest {
     pub seed: u64,
     /// Keep trajectories, maps and graphs, which were made from other measurements.
     pub keep_estimates: bool,
+    /// Name of the sequence; by default that of the input.
+    pub name: Option<String>,
 }
 
 impl MeasureRequest {
     /// Measurements with some noise, of the first seed.
     #[must_use]
     pub const fn new(recipe: NoiseRecipe) -> Self {
-        Self { recipe, seed: 0, keep_estimates: false }
+        Self { recipe, seed: 0, keep_estimates: false, name: None }
+    }
+}
+
+impl MeasureRequest {
+    /// Refuses a name that no sequence can have.
+    ///
+    /// # Errors
+    /// [`Error::Name`].
+    pub fn check_name(&self) -> Result<(), Error> {
+        self.name.as_deref().map_or(Ok(()), super::check_sequence_name)
     }
 }
 
@@ -45,9 +57,10 @@ pub struct MeasureSummary {
 /// the same measurements, on any machine.
 ///
 /// # Errors
-/// [`Error::UnknownCamera`], [`Error::Missing`] where there is nothing to measure, and [`Error::Simulate`] for noise out of range.
+/// [`Error::Name`], [`Error::UnknownCamera`], [`Error::Missing`] where there is nothing to measure, and [`Error::Simulate`] for noise out of range.
 pub fn measure(input: &Sequence, request: &MeasureRequest) -> Result<(Sequence, MeasureSummary), Error> {
     request.recipe.check()?;
+    request.check_name()?;
     let cameras = &input.manifest;
     if let Some(frame) = input.frames.iter().find(|frame| cameras.camera(frame.camera_id).is_none()) {
         return Err(Error::UnknownCamera { frame: frame.frame_id, camera: frame.camera_id });
@@ -56,8 +69,7 @@ pub fn measure(input: &Sequence, request: &MeasureRequest) -> Result<(Sequence, 
         return Err(Error::Missing { missing: "observations to measure", remedy: "" });
     }
     let mut sequence = kept(input, request.keep_estimates);
-    sequence.manifest =
-        measured_manifest(&input.manifest, &request.recipe, request.seed, request.keep_estimates);
+    sequence.manifest = measured_manifest(&input.manifest, request);
     sequence.point_observations.clone_from(&input.point_observations);
     sequence.line_observations.clone_from(&input.line_observations);
     sequence.sort();
@@ -110,19 +122,20 @@ fn kept(input: &Sequence, keep_estimates: bool) -> Sequence {
 /// Keeps the measurements of a sequence, and gives those without depth one, drawn about the true depth.
 ///
 /// # Errors
-/// [`Error::Missing`] where there are no measurements, and [`Error::Simulate`] for noise out of range.
+/// [`Error::Name`], [`Error::Missing`] where there are no measurements, and [`Error::Simulate`] for noise out of range.
 pub fn complete_depths(
     input: &Sequence,
     request: &MeasureRequest,
 ) -> Result<(Sequence, CompletedDepths), Error> {
-    let MeasureRequest { recipe, seed, keep_estimates } = request;
+    let MeasureRequest { recipe, seed, keep_estimates, .. } = request;
     recipe.check()?;
+    request.check_name()?;
     if input.point_measurements.is_empty() && input.line_measurements.is_empty() {
         return Err(Error::Missing { missing: "measurements whose depth could be completed", remedy: "" });
     }
     let mut sequence = input.clone();
     let done = recipe.complete_depths(&mut sequence, *seed);
-    sequence.manifest = measured_manifest(&input.manifest, recipe, *seed, *keep_estimates);
+    sequence.manifest = measured_manifest(&input.manifest, request);
     // Pixels stay as they were measured, and so does what was declared of them.
     if let Some(noise) = input.manifest.noise.as_ref().filter(|noise| noise.model == recipe.model.name()) {
         sequence.manifest.noise = Some(noise.clone());
@@ -166,15 +179,14 @@ const TOOL: &str = "os measure";
 
 /// The manifest of a sequence whose measurements were made anew.
 #[must_use]
-pub fn measured_manifest(
-    input: &Manifest,
-    recipe: &NoiseRecipe,
-    seed: u64,
-    keep_estimates: bool,
-) -> Manifest {
+pub fn measured_manifest(input: &Manifest, request: &MeasureRequest) -> Manifest {
+    let MeasureRequest { recipe, seed, keep_estimates, name } = request;
     let mut manifest = input.clone();
+    if let Some(name) = name {
+        manifest.name.clone_from(name);
+    }
     registry::SPEC_VERSION.clone_into(&mut manifest.spec_version);
-    manifest.noise = Some(recipe.declared(seed));
+    manifest.noise = Some(recipe.declared(*seed));
     manifest.tables.clear();
     let generator = &mut manifest.generator;
     let before = format!("{} {}", generator.tool, generator.version);
@@ -187,13 +199,13 @@ pub fn measured_manifest(
     }
     TOOL.clone_into(&mut generator.tool);
     env!("CARGO_PKG_VERSION").clone_into(&mut generator.version);
-    generator.seed = Some(seed);
+    generator.seed = Some(*seed);
     let made_anew = [PointMeasurement::TABLE.name, LineMeasurement::TABLE.name];
     let made_of_them =
         ["trajectories", "map_points", "graph_poses", "graph_points", "graph_lines", "graph_factors"];
     manifest.recovered.retain(|entry| {
         let table = entry.table.as_str();
-        !made_anew.contains(&table) && (keep_estimates || !made_of_them.contains(&table))
+        !made_anew.contains(&table) && (*keep_estimates || !made_of_them.contains(&table))
     });
     manifest
 }

@@ -34,6 +34,6 @@ pub use error::Error;
 pub use evaluate::{EvaluateRequest, evaluate, evaluated};
 pub use graph::{GraphCounts, GraphKind, GraphRequest, GraphSummary, estimate_of, graph};
 pub use measure::{MeasureRequest, MeasureSummary, complete_depths, measure, measured_manifest};
-pub use named::{check_cameras, check_name};
+pub use named::{check_cameras, check_name, check_sequence_name};
 pub use simulate::{simulate, simulation_recipe};
 pub use track::{TrackRequest, TrackSummary, track};

@@ -126,8 +126,8 @@ impl Collection {
     /// and what they are called now.
     ///
     /// # Errors
-    /// Those of opening; [`Error::OutsideCollection`] for an MCAP file, [`Error::Exists`] where the place is taken: nothing was
-    /// renamed then.
+    /// Those of opening; [`Error::OutsideCollection`] for an MCAP file, [`Error::Exists`] where the place is taken, [`Error::OneName`]
+    /// for two of one name: nothing was renamed then.
     pub fn adopt(&mut self) -> Result<Vec<(PathBuf, PathBuf)>, Error> {
         storage::on_this_machine(&self.path).map_err(Error::io(&self.path))?;
         let mut renamed: Vec<(PathBuf, PathBuf)> = Vec::new();
@@ -137,7 +137,11 @@ impl Collection {
             if path.is_file() {
                 return Err(outside(path, &target));
             }
-            if target.symlink_metadata().is_ok() || renamed.iter().any(|(_, other)| *other == target) {
+            if let Some((twin, _)) = renamed.iter().find(|(_, other)| *other == target) {
+                let name = reader.manifest().name.clone();
+                return Err(Error::OneName { name, first: twin.clone(), second: path.clone() });
+            }
+            if target.symlink_metadata().is_ok() {
                 return Err(Error::Exists { path: target });
             }
             renamed.push((path.clone(), target));

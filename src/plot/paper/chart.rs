@@ -129,7 +129,12 @@ impl Chart {
     }
 
     fn y_ticks(axis: &Axis, height: f64, style: &Style) -> Vec<Tick> {
-        let ticks = axis.ticks_about((height / (1.9 * style.small)).clamp(2.0, 6.0));
+        let about = (height / (1.9 * style.small)).clamp(2.0, 6.0);
+        let mut ticks = axis.ticks_about(about);
+        // One number alone tells no scale.
+        if ticks.len() < 2 {
+            ticks = axis.ticks_about(2.0 * about);
+        }
         ticks.into_iter().map(|tick| Tick { words: printed(&tick.words), ..tick }).collect()
     }
 

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::super::chart::Area;
 use super::super::scene_shapes::ranked;
 use super::legend::{Entry, Sample};
+use super::scene_view::NAMED;
 use super::sheet::{Mark, Sheet, Stroke};
 use super::style::Style;
 use super::theme::Colours;
@@ -32,6 +33,25 @@ pub struct MeasurementImage {
     pub points: Vec<[f64; 2]>,
     /// Segments.
     pub segments: Vec<Segment>,
+    /// Names of the sequence's groups of lines, by rank.
+    pub groups: Vec<String>,
+}
+
+/// The groups of a sequence, the largest first: their ranks give the same colours as in a scene.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RankedGroups {
+    rank_of: BTreeMap<LineId, usize>,
+    names: Vec<String>,
+}
+
+impl RankedGroups {
+    /// Ranks the groups of a sequence.
+    #[must_use]
+    pub fn of(groups: &[StructuralGroup]) -> Self {
+        let (largest, rank_of) = ranked(groups);
+        let of_lines = largest.iter().filter(|group| !group.line_ids.is_empty());
+        Self { rank_of, names: of_lines.map(|group| group.group_id.to_string()).collect() }
+    }
 }
 
 /// The colour of a group: the colours of the theme, round by round darker.
@@ -51,18 +71,12 @@ fn darker(colour: &str, part: f64) -> String {
     format!("#{:02x}{:02x}{:02x}", dark(1), dark(3), dark(5))
 }
 
-/// The rank of each line's group, the largest group first: the same colours as in a scene.
-#[must_use]
-pub fn group_ranks(groups: &[StructuralGroup]) -> BTreeMap<LineId, usize> {
-    ranked(groups).1
-}
-
 impl MeasurementImage {
     /// What a frame measured, or its observations if it has no measurement.
     ///
-    /// * `rank_of` — see [`group_ranks`].
+    /// * `groups` — those of the sequence.
     #[must_use]
-    pub fn of(camera: &Camera, frame: &FrameBundle, rank_of: &BTreeMap<LineId, usize>) -> Self {
+    pub fn of(camera: &Camera, frame: &FrameBundle, groups: &RankedGroups) -> Self {
         let corner = if camera.pixel_origin == registry::PIXEL_CENTER { 0.5 } else { 0.0 };
         let pixel = |u: f64, v: f64| [u + corner, v + corner];
         macro_rules! image {
@@ -74,9 +88,10 @@ impl MeasurementImage {
                         .iter()
                         .map(|row| Segment {
                             ends: [pixel(row.start_u, row.start_v), pixel(row.end_u, row.end_v)],
-                            group: rank_of.get(&row.line_id).copied(),
+                            group: groups.rank_of.get(&row.line_id).copied(),
                         })
                         .collect(),
+                    groups: groups.names.clone(),
                 }
             };
         }
@@ -107,9 +122,14 @@ impl MeasurementImage {
             name: name.to_owned(),
         };
         if self.segments.iter().any(|segment| segment.group.is_some()) {
-            entries.push(stroke(Some(0), "lines, coloured by group"));
+            // All of the sequence, so that the frames of a figure have one legend.
+            let named = self.groups.iter().enumerate().take(NAMED);
+            entries.extend(named.map(|(rank, name)| stroke(Some(rank), name)));
+            if self.groups.len() > NAMED {
+                entries.push(stroke(Some(NAMED), &format!("{} more", self.groups.len() - NAMED)));
+            }
             if self.segments.iter().any(|segment| segment.group.is_none()) {
-                entries.push(stroke(None, "lines in no group"));
+                entries.push(stroke(None, "no group"));
             }
         } else if !self.segments.is_empty() {
             entries.push(stroke(None, "lines"));

@@ -24,7 +24,7 @@ pub use curve::{Curve, Drawn, Role, with_gaps};
 pub use error::PaperError;
 pub use figure::{Content, Look, Panel, PaperFigure};
 pub use histogram::{Histogram, histogram};
-pub use measurement_image::{MeasurementImage, Segment, group_ranks};
+pub use measurement_image::{MeasurementImage, RankedGroups, Segment};
 #[cfg(feature = "figures")]
 pub use rendered::{pdf, png};
 pub use scene_view::SceneView;

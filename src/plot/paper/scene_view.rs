@@ -15,7 +15,7 @@ use crate::structure::LineId;
 /// Most points that are drawn: more hide each other in a column.
 const MOST_DOTS: usize = 6000;
 /// Groups that the legend names.
-const NAMED: usize = 15;
+pub(super) const NAMED: usize = 15;
 /// Free around the scene, points.
 const MARGIN: f64 = 6.0;
 /// Length of an axis, points.

@@ -223,9 +223,10 @@ export class Scene {
 
     gl.useProgram(this.strokeProgram.program);
     setUniforms(this.strokeProgram, shared);
-    const stroke = (strokes, classes, width, opacity = 1, period = 0) => {
+    const period = this.sequence.radius / 22;
+    const stroke = (strokes, classes, width, opacity = 1, dash = 0) => {
       if (!strokes.count) return;
-      setUniforms(this.strokeProgram, { width: width * ratio, colour: [...this.rgb(classes), opacity], period });
+      setUniforms(this.strokeProgram, { width: width * ratio, colour: [...this.rgb(classes), opacity], period, dash });
       gl.bindVertexArray(strokes.array.vertexArrayObject);
       drawBufferInfo(gl, strokes.array, gl.TRIANGLE_STRIP, 4, 0, strokes.count);
     };
@@ -236,9 +237,15 @@ export class Scene {
       stroke(seen, classesOf(group), 4.2);
     }
     this.paths.forEach((path, place) => {
+      if (!shows(`path-${place}`)) return;
       const { class: classes } = this.sequence.paths[place];
-      const period = place === 0 ? 0 : this.sequence.radius / (22 + 6 * place);
-      if (shows(`path-${place}`)) stroke(path, classes, place === 0 ? 1.8 : 2.4, 1, period);
+      if (!classes.startsWith("series")) return stroke(path, classes, 1.8);
+      const dash = Number(classes.match(/dash-(\d)/)?.[1] ?? 0);
+      // An edge tells the path of an estimate from lines of its colour.
+      stroke(path, "ink", 3.7, 0.9, dash);
+      gl.depthFunc(gl.ALWAYS);
+      stroke(path, classes, 2.3, 1, dash);
+      gl.depthFunc(gl.LEQUAL);
     });
     if (!this.follows) stroke(this.camera, "truth", 2.2);
 

@@ -53,10 +53,15 @@ export const STROKES = [
   precision highp float;
   uniform vec4 colour;
   uniform float period;
+  uniform int dash;
   in float travelled;
   out vec4 fragment;
   void main() {
-    if (period > 0.0 && fract(travelled / period) > 0.62) discard;
+    // As the style sheet dashes curves: 1 long, 2 dots, 3 long and a dot.
+    float part = fract(travelled / period);
+    if (dash == 1 && part > 0.62) discard;
+    if (dash == 2 && fract(3.0 * part) > 0.45) discard;
+    if (dash == 3 && (part > 0.82 || (part > 0.52 && part < 0.69))) discard;
     fragment = colour;
   }`,
 ];

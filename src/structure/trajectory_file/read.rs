@@ -104,10 +104,11 @@ fn parse(format: TrajectoryFormat, line: usize, text: &str) -> Result<Trajectory
         }
         TrajectoryFormat::Euroc => {
             let [stamp, numbers @ ..]: [&str; 8] = fields(line, text.split(',').map(str::trim), false)?;
-            (
-                Some(stamp_of(line, stamp, 0, "a stamp in nanoseconds")?),
-                quaternion_row(line, numbers, [4, 5, 6, 3])?,
-            )
+            let expected = "a whole stamp in nanoseconds (EuRoC; files of TUM have seconds, and spaces in place of commas)";
+            if has_fraction(stamp) {
+                return Err(TrajectoryFileError::content(line, expected, format!("`{stamp}`")));
+            }
+            (Some(stamp_of(line, stamp, 0, expected)?), quaternion_row(line, numbers, [4, 5, 6, 3])?)
         }
         TrajectoryFormat::Kitti => {
             (None, matrix_row(line, fields(line, text.split_ascii_whitespace(), true)?)?)
@@ -137,6 +138,12 @@ fn fields<'a, const N: usize>(
 fn stamp_of(line: usize, text: &str, shift: i32, expected: &str) -> Result<i64, TrajectoryFileError> {
     scaled_integer(text, shift)
         .ok_or_else(|| TrajectoryFileError::content(line, expected, format!("`{text}`")))
+}
+
+/// Whether a number is written with digits behind the point that are not all zero.
+fn has_fraction(text: &str) -> bool {
+    let fraction = text.split_once('.').map_or("", |(_, fraction)| fraction);
+    !fraction.contains(['e', 'E']) && fraction.contains(|digit: char| ('1'..='9').contains(&digit))
 }
 
 fn numbers<const N: usize>(line: usize, texts: [&str; N]) -> Result<[f64; N], TrajectoryFileError> {

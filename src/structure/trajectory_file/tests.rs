@@ -88,6 +88,11 @@ fn each_format_has_its_order_of_numbers() {
         read(&format!("#timestamp,x\n1403636580838555648,1,2,3,{half},0,0,{half},9,nonsense\n")).unwrap();
     quarter_turn_about_z(&euroc[0]);
     assert_eq!((euroc[0].line, euroc[0].stamp_nanos), (2, Some(1_403_636_580_838_555_648)));
+    let zeros = read("1403636580838555648.000,1,2,3,1,0,0,0\n").unwrap();
+    assert_eq!(zeros[0].stamp_nanos, euroc[0].stamp_nanos);
+    // Seconds with commas would all be at 0 ns.
+    let error = read("0.033,1,2,3,0,0,0,1\n").unwrap_err().to_string();
+    assert!(error.contains("files of TUM have seconds") && error.contains("`0.033`"), "{error}");
 }
 
 #[test]

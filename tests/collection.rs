@@ -169,6 +169,23 @@ fn what_lies_outside_is_never_left_out_in_silence() {
     ended(at, &["index", "nowhere"], 1);
 }
 
+#[test]
+fn sequences_of_a_collection_that_have_no_estimate_are_left_out_and_told() {
+    let folder = collection();
+    let at = folder.path();
+    let words = ended(at, &["evaluate", "all"], 1);
+    assert!(words.contains("expected an estimate to compare, found none"), "{words}");
+    ended(at, &["export", "all/sequence=a", "--to", "tum", "--estimate", "truth", "-o", "truth.txt"], 0);
+    ended(at, &["import-trajectory", "all/sequence=a", "truth.txt", "--name", "mine", "-o", "with"], 0);
+    fs::remove_dir_all(at.join("all/sequence=a")).unwrap();
+    fs::rename(at.join("with"), at.join("all/sequence=a")).unwrap();
+    let words = ended(at, &["evaluate", "all"], 3);
+    assert!(
+        words.contains("mine") && words.contains("expected an estimate to compare, found none; left out")
+    );
+    ended(at, &["evaluate", "all/sequence=a"], 0);
+}
+
 /// A table of results without its times.
 fn without_times(path: &Path) -> ResultTable {
     let mut table = read_results(path).unwrap();

@@ -164,11 +164,10 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
     let options = args.options()?;
     args.output.refuse_inputs(&args.sequences)?;
     args.output.refuse_inputs(&args.files)?;
-    let compared: Vec<Compared> = if args.files.is_empty() {
-        let sequences = inputs::sequences(&args.sequences)?;
-        sequences.iter().map(|path| sequence(args, path, &options)).collect::<Result<_, _>>()?
+    let (compared, left_out) = if args.files.is_empty() {
+        sequences(args, &options)?
     } else {
-        vec![evaluate_files::compare(&args.files, args.stamps()?, &options)?]
+        (vec![evaluate_files::compare(&args.files, args.stamps()?, &options)?], Outcome::Done)
     };
     let relations = args.relations();
     args.output.write(&compared, relations.first().copied())?;
@@ -190,7 +189,37 @@ pub(super) fn run(args: &Args, stdout: &mut dyn Write) -> anyhow::Result<Outcome
         evaluate_shown::statistics(&rows, &relations, args.markdown, stdout)?;
     }
     stdout.flush()?;
-    complaints(&rows)
+    let outcome = complaints(&rows)?;
+    Ok(if left_out == Outcome::Done { outcome } else { left_out })
+}
+
+/// Compares the estimates of each sequence. Those of a collection that lack what is asked for are left out, and told; all of them
+/// fail where none has it.
+fn sequences(args: &Args, options: &EvaluateOptions) -> anyhow::Result<(Vec<Compared>, Outcome)> {
+    let paths = inputs::sequences(&args.sequences)?;
+    let may_lack = paths.len() > args.sequences.len();
+    let (mut compared, mut lacking) = (Vec::new(), Vec::new());
+    for path in &paths {
+        match sequence(args, path, options) {
+            Ok(found) => compared.push(found),
+            Err(error) if may_lack && lacks_estimate(&error) => lacking.push(error),
+            Err(error) => return Err(error),
+        }
+    }
+    let mut outcome = Outcome::Done;
+    for error in lacking {
+        if compared.is_empty() {
+            return Err(error);
+        }
+        writeln!(io::stderr(), "warning: {error:#}; left out")?;
+        outcome = Outcome::Findings;
+    }
+    Ok((compared, outcome))
+}
+
+fn lacks_estimate(error: &anyhow::Error) -> bool {
+    let causes = error.chain().filter_map(|cause| cause.downcast_ref::<stations::Error>());
+    causes.into_iter().any(|cause| matches!(cause, stations::Error::Unknown { .. }))
 }
 
 /// Says what could not be compared; fails when that is everything.

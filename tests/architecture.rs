@@ -88,7 +88,7 @@ const ROOMS: &[(&str, &[&str])] = &[
 /// Libraries that only some may name, and why.
 const LIBRARIES: &[(&[&str], &[&str], &str)] = &[
     (
-        &["arrow", "parquet", "mcap", "foxglove"],
+        &["arrow", "parquet", "mcap", "foxglove", "zstd", "lz4", "crc32fast"],
         &["src/format/"],
         "files are the business of the room `format`",
     ),

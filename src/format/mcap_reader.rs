@@ -17,6 +17,7 @@ use super::arrow_batch::from_batch;
 use super::arrow_message::{decode_batch, decode_schema};
 use super::counted_file::CountedFile;
 use super::guard::guarded;
+use super::mcap_chunk::{AFTER_CHECKSUM, Checksum};
 use super::mcap_survey::McapSurvey;
 use super::reader::Damaged;
 use super::stored_table::StoredTable;
@@ -46,11 +47,19 @@ pub(super) struct McapReader {
     channels: BTreeMap<&'static str, Vec<TableChannel>>,
     stored: Vec<StoredTable>,
     passed_over: Vec<String>,
+    /// Whether chunks are held against their checksums.
+    checks: bool,
 }
 
 impl McapReader {
     /// Opens a file; tables whose channels cannot be understood are listed apart.
-    pub(super) fn open(path: &Path, bytes_read: Arc<AtomicU64>) -> Result<(Self, Damaged), Error> {
+    ///
+    /// * `checks` — whether chunks are refused whose checksums are wrong.
+    pub(super) fn open(
+        path: &Path,
+        bytes_read: Arc<AtomicU64>,
+        checks: bool,
+    ) -> Result<(Self, Damaged), Error> {
         let file = CountedFile::open(path, bytes_read)?;
         let summary = guarded(path, "MCAP", || read_summary(&file))?;
         check_chunks(path, &summary, file.length())?;
@@ -77,7 +86,7 @@ impl McapReader {
                 Err(error) => damaged.push((table, error)),
             }
         }
-        Ok((Self { file, summary, channels, stored, passed_over }, damaged))
+        Ok((Self { file, summary, channels, stored, passed_over, checks }, damaged))
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -172,16 +181,34 @@ impl McapReader {
         if let Some((first, last)) = stamps {
             options = options.starting_at(first).ending_at(last);
         }
+        let mut checks = None;
         let reader = if topics.is_empty() {
             None
         } else {
             let options = options.include_topics(topics);
             Some(guarded(self.path(), "MCAP", || {
-                IndexedReader::new_with_options(&self.summary, options)
-                    .map_err(|error| Error::container(self.path(), "MCAP")(error.into()))
+                let failed = |error: mcap::McapError| Error::container(self.path(), "MCAP")(error.into());
+                let mut reader = IndexedReader::new_with_options(&self.summary, options).map_err(failed)?;
+                if self.checks {
+                    let checksum = Checksum::default();
+                    checksum.checked_by(&mut reader).map_err(failed)?;
+                    checks = Some((checksum, self.compressions()?));
+                }
+                Ok(reader)
             })?)
         };
-        Ok(Messages { file: self.file.clone(), reader })
+        Ok(Messages { file: self.file.clone(), reader, checks })
+    }
+
+    /// How long the name of each chunk's compression is, by the place where its contents begin.
+    fn compressions(&self) -> Result<BTreeMap<u64, u64>, Error> {
+        let failed = |error: mcap::McapError| Error::container(self.path(), "MCAP")(error.into());
+        let chunks = self.summary.chunk_indexes.iter();
+        chunks
+            .map(|chunk| {
+                Ok((chunk.compressed_data_offset().map_err(failed)?, chunk.compression.len() as u64))
+            })
+            .collect()
     }
 
     /// The table that a message belongs to.
@@ -290,11 +317,13 @@ pub(super) struct Message {
 pub(super) struct Messages {
     file: CountedFile,
     reader: Option<IndexedReader>,
+    /// What chunks are held against, and how long the name of each one's compression is.
+    checks: Option<(Checksum, BTreeMap<u64, u64>)>,
 }
 
 impl Messages {
     fn advance(&mut self) -> Result<Option<Message>, Error> {
-        let Self { file, reader } = self;
+        let Self { file, reader, checks } = self;
         let Some(indexed) = reader else { return Ok(None) };
         guarded(file.path(), "MCAP", || {
             let failed = |error: mcap::McapError| Error::container(file.path(), "MCAP")(error.into());
@@ -312,8 +341,20 @@ impl Messages {
                         IndexedReadEvent::ReadChunkRequest { offset, length } => (offset, length),
                     },
                 };
-                let bytes = file.read_exact_at(offset, length).map_err(Error::io(file.path()))?;
-                indexed.insert_chunk_record_data(offset, &bytes).map_err(failed)?;
+                // With the end of its header, where the checksum stands.
+                let compression = checks.as_ref().and_then(|(_, names)| names.get(&offset)).copied();
+                let before = compression.map_or(0, |name| AFTER_CHECKSUM + name);
+                let begin = offset.checked_sub(before).ok_or_else(|| failed(mcap::McapError::BadIndex))?;
+                let whole = usize::try_from(before).unwrap_or_default().saturating_add(length);
+                let bytes = file.read_exact_at(begin, whole).map_err(Error::io(file.path()))?;
+                let (header, bytes) = bytes.split_at(bytes.len() - length);
+                if let (Some((checksum, _)), Some(saved)) = (&*checks, header.first_chunk()) {
+                    checksum.expect(u32::from_le_bytes(*saved));
+                    if compression == Some(0) {
+                        checksum.check(bytes).map_err(failed)?;
+                    }
+                }
+                indexed.insert_chunk_record_data(offset, bytes).map_err(failed)?;
             }
         })
     }

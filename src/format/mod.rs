@@ -23,6 +23,7 @@ mod foxglove;
 mod frames;
 mod guard;
 mod json_schema;
+mod mcap_chunk;
 mod mcap_reader;
 mod mcap_survey;
 mod mcap_writer;

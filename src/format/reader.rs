@@ -100,7 +100,7 @@ impl SequenceReader {
                 path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new(".")),
             );
         } else {
-            let (reader, mut damaged) = McapReader::open(path, Arc::clone(&bytes_read))?;
+            let (reader, mut damaged) = McapReader::open(path, Arc::clone(&bytes_read), true)?;
             if !damaged.is_empty() {
                 return Err(damaged.swap_remove(0).1);
             }
@@ -132,7 +132,8 @@ impl SequenceReader {
             let (tables, passed_over, damaged) = open_tables(path, &bytes_read)?;
             (Backend::Parquet(tables), passed_over, damaged)
         } else {
-            let (reader, damaged) = McapReader::open(path, Arc::clone(&bytes_read))?;
+            // Wrong checksums are findings of the validator.
+            let (reader, damaged) = McapReader::open(path, Arc::clone(&bytes_read), false)?;
             let passed_over = reader.unknown_topics();
             (Backend::Mcap(Box::new(reader)), passed_over, damaged)
         };

@@ -158,6 +158,47 @@ fn an_mcap_chunk_that_claims_to_be_huge_is_refused() {
     tally.tell("huge chunks in MCAP");
 }
 
+/// The messages of a file in chunks that are compressed otherwise.
+fn recompressed(whole: &[u8], compression: Option<mcap::Compression>) -> Vec<u8> {
+    let options = mcap::WriteOptions::new().compression(compression).chunk_size(Some(1 << 12));
+    let mut writer = options.create(std::io::Cursor::new(Vec::new())).unwrap();
+    for message in mcap::MessageStream::new(whole).unwrap() {
+        writer.write(&message.unwrap()).unwrap();
+    }
+    writer.finish().unwrap();
+    writer.into_inner().into_inner()
+}
+
+#[test]
+fn no_row_changes_when_a_bit_of_a_chunk_flips() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("flipped.mcap");
+    for compression in [Some(mcap::Compression::Zstd), Some(mcap::Compression::Lz4), None] {
+        let whole = recompressed(&mcap_bytes(), compression);
+        fs::write(&path, &whole).unwrap();
+        let expected = format::read(&path).unwrap();
+        let (mut read, mut refused) = (0, 0);
+        for chunk in mcap::Summary::read(&whole).unwrap().unwrap().chunk_indexes {
+            let [begin, length] =
+                [chunk.chunk_start_offset, chunk.chunk_length].map(|number| usize::try_from(number).unwrap());
+            for place in (begin..begin + length).step_by(41) {
+                let mut bytes = whole.clone();
+                bytes[place] ^= 1 << (place % 8);
+                fs::write(&path, &bytes).unwrap();
+                match format::read(&path) {
+                    // Headers of chunks say again what the index says.
+                    Ok(found) => {
+                        assert!(found == expected, "{compression:?}, byte {place}");
+                        read += 1;
+                    }
+                    Err(_) => refused += 1,
+                }
+            }
+        }
+        assert!(refused > 20 * read, "{compression:?}: {read} read, {refused} refused");
+    }
+}
+
 /// Megabytes of zeros that compress to almost nothing, in a chunk whose sizes are honest.
 #[test]
 fn an_mcap_chunk_of_zeros_stays_within_bounds() {

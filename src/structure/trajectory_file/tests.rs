@@ -128,7 +128,7 @@ fn what_is_wrong_is_said_with_its_line() {
         ("2 1 2 3 0 0 0 1\n1 1 2 3 0 0 0 1\n", Some(2), "after 2000000000 ns", "1000000000 ns"),
         ("2 1 2 3 0 0 0 1\n2 1 2 3 0 0 0 1\n", Some(2), "after 2000000000 ns", "2000000000 ns"),
         ("0.5,1,2,3,1,0,0\n", Some(1), "8 numbers", "7"),
-        ("zero,1,2,3,1,0,0,0\none,1,2,3,1,0,0,0\n", Some(2), "a stamp in nanoseconds", "`one`"),
+        ("zero,1,2,3,1,0,0,0\none,1,2,3,1,0,0,0\n", Some(2), "a whole stamp in nanoseconds", "`one`"),
         ("1 0 0 0 0 1 0 0 0 0 -1 0\n", Some(1), "a rotation matrix", "reflection"),
         ("2 0 0 0 0 1 0 0 0 0 1 0\n", Some(1), "a rotation matrix", "orthonormal"),
         ("1e300 0 0 0 0 1e300 0 0 0 0 1 0\n", Some(1), "a rotation matrix", "inf"),

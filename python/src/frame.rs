@@ -8,13 +8,14 @@ use pyo3::prelude::*;
 
 use crate::column::Column;
 use crate::errors;
+use crate::sent::Sent;
 use crate::sequence::matrix;
 use crate::table::Table;
 
 /// One frame: an exposure of a camera, with its rows of the tables of frames.
 #[pyclass(frozen, module = "open_structure")]
 pub(crate) struct Frame {
-    frame_id: FrameId,
+    id: FrameId,
     stamp_nanos: i64,
     camera_id: CameraId,
     pose: Option<PoseRow>,
@@ -30,13 +31,13 @@ enum Shown {
 }
 
 /// A frame as it is sent to another process.
-type Sent = (i64, i64, i64, Option<[f64; 7]>, [Table; 4]);
+type Parts = (i64, i64, i64, Option<[f64; 7]>, [Table; 4]);
 
 impl Frame {
     pub(crate) fn new(bundle: FrameBundle) -> Self {
         let frame = &bundle.frame;
         Self {
-            frame_id: frame.frame_id,
+            id: frame.frame_id,
             stamp_nanos: frame.stamp_nanos,
             camera_id: frame.camera_id,
             pose: frame.world_from_camera(),
@@ -54,7 +55,7 @@ impl Frame {
     /// Name of the frame.
     #[getter]
     fn frame_id(&self) -> i64 {
-        self.frame_id.0
+        self.id.0
     }
 
     /// Time of the exposure, nanoseconds.
@@ -73,7 +74,7 @@ impl Frame {
     #[getter]
     fn world_from_camera<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         let Some(row) = self.pose else { return Ok(None) };
-        let pose = row.pose().map_err(|cause| errors::step(format!("{}: {cause}", self.frame_id)))?;
+        let pose = row.pose().map_err(|cause| errors::step(format!("{}: {cause}", self.id)))?;
         let numbers = arrow::array::Float64Array::from(matrix(&pose).to_vec());
         Column::as_numpy(py, Arc::new(numbers))?.call_method1("reshape", (4, 4)).map(Some)
     }
@@ -115,7 +116,7 @@ impl Frame {
     }
 
     /// Sent to another process, a frame takes its rows along.
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Sent)> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> Sent<'py, Parts> {
         let tables = [
             self.point_measurements()?,
             self.line_measurements()?,
@@ -125,8 +126,8 @@ impl Frame {
         let pose = self.pose.map(|PoseRow { translation: [tx, ty, tz], rotation_xyzw: [qx, qy, qz, qw] }| {
             [tx, ty, tz, qx, qy, qz, qw]
         });
-        let sent = (self.frame_id.0, self.stamp_nanos, self.camera_id.0, pose, tables);
-        Ok((py.get_type::<Self>().getattr("_received")?, sent))
+        let parts = (self.id.0, self.stamp_nanos, self.camera_id.0, pose, tables);
+        Ok((py.get_type::<Self>().getattr("_received")?, parts))
     }
 
     /// What `__reduce__` sent.
@@ -139,7 +140,7 @@ impl Frame {
         tables: [PyRef<'_, Table>; 4],
     ) -> Self {
         Self {
-            frame_id: FrameId(frame_id),
+            id: FrameId(frame_id),
             stamp_nanos,
             camera_id: CameraId(camera_id),
             pose: pose.map(PoseRow::from_numbers),
@@ -152,6 +153,6 @@ impl Frame {
             Shown::Rows(bundle) => [bundle.point_measurements.len(), bundle.line_measurements.len()],
             Shown::Tables([points, lines, ..]) => [points.rows(), lines.rows()],
         };
-        format!("<Frame {}: {points} points and {lines} lines measured>", self.frame_id.0)
+        format!("<Frame {}: {points} points and {lines} lines measured>", self.id.0)
     }
 }

@@ -13,6 +13,7 @@ use pyo3::types::{PyList, PySlice};
 
 use crate::errors;
 use crate::frame::Frame;
+use crate::sent::Sent;
 use crate::sequence::{Sequence, Source};
 use crate::work;
 
@@ -71,10 +72,7 @@ impl Frames {
     }
 
     /// Sent to another process, the frames are those of the sequence there.
-    fn __reduce__<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(Bound<'py, PyAny>, (Py<Sequence>, &'static str))> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> Sent<'py, (Py<Sequence>, &'static str)> {
         Ok((py.import("builtins")?.getattr("getattr")?, (self.sequence.clone_ref(py), "frames")))
     }
 

@@ -14,6 +14,7 @@ mod frames;
 mod graph;
 mod json;
 mod measure;
+mod sent;
 mod sequence;
 mod simulate;
 mod table;

@@ -18,6 +18,7 @@ use crate::estimate;
 use crate::frame::Frame;
 use crate::frames::{FrameIterator, Frames};
 use crate::json;
+use crate::sent::Sent;
 use crate::table::Table;
 use crate::validate;
 use crate::work;
@@ -221,7 +222,7 @@ impl Sequence {
         slf
     }
 
-    fn __deepcopy__<'py>(slf: Py<Self>, memo: &Bound<'py, PyAny>) -> Py<Self> {
+    fn __deepcopy__(slf: Py<Self>, memo: &Bound<'_, PyAny>) -> Py<Self> {
         let _ = memo;
         slf
     }
@@ -363,7 +364,7 @@ impl Sequence {
     }
 
     /// Sent to another process, a sequence is its path, and is opened there; one in memory has none.
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (OsString,))> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> Sent<'py, (OsString,)> {
         let Source::File(reader) = &self.source else {
             return Err(PyTypeError::new_err(
                 "a sequence in memory cannot be sent to another process; send what `write` gives instead",

@@ -17,6 +17,7 @@ use pyo3::types::{PyBytes, PyCapsule, PyDict, PyIterator, PyList, PyString};
 
 use crate::column::{Column, bytes_of};
 use crate::errors;
+use crate::sent::Sent;
 
 /// One table of a sequence.
 ///
@@ -138,7 +139,7 @@ impl Table {
     }
 
     /// Sent to another process, a table is its rows.
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (&str, Bound<'py, PyBytes>))> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> Sent<'py, (&str, Bound<'py, PyBytes>)> {
         let mut stream = Vec::new();
         let written = StreamWriter::try_new(&mut stream, &self.batch.schema())
             .and_then(|mut writer| writer.write(&self.batch).and_then(|()| writer.finish()));

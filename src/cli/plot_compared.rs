@@ -43,11 +43,11 @@ pub(super) fn figure(wanted: &Wanted<'_>, problems: &mut Vec<String>) -> anyhow:
         .collect::<anyhow::Result<_>>()?;
     let (what, panels, columns) = match wanted.figure {
         Figure::Xyz => {
-            let (panels, columns) = stacked(wanted, &all, ["x (m)", "y (m)", "z (m)"], 0)?;
+            let (panels, columns) = stacked(wanted, &all, ["x (m)", "y (m)", "z (m)"], 0);
             ("Coordinates over time", panels, columns)
         }
         Figure::Rpy => {
-            let (panels, columns) = stacked(wanted, &all, ["Roll (°)", "Pitch (°)", "Yaw (°)"], 3)?;
+            let (panels, columns) = stacked(wanted, &all, ["Roll (°)", "Pitch (°)", "Yaw (°)"], 3);
             ("Angles over time", panels, columns)
         }
         Figure::Ape => {
@@ -80,12 +80,7 @@ pub(super) fn figure(wanted: &Wanted<'_>, problems: &mut Vec<String>) -> anyhow:
 }
 
 /// Three charts over each other for each sequence, the sequences side by side where there is room.
-fn stacked(
-    wanted: &Wanted<'_>,
-    all: &[Compared],
-    names: [&str; 3],
-    first: usize,
-) -> anyhow::Result<(Vec<Panel>, usize)> {
+fn stacked(wanted: &Wanted<'_>, all: &[Compared], names: [&str; 3], first: usize) -> (Vec<Panel>, usize) {
     let columns = match all.len() {
         2 | 3 if wanted.wide => all.len(),
         count if wanted.wide && count % 2 == 0 => 2,
@@ -113,7 +108,7 @@ fn stacked(
             }
         }
     }
-    Ok((panels, columns))
+    (panels, columns)
 }
 
 /// Absolute errors of each sequence, all in one unit and on one kind of scale.

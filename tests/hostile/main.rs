@@ -195,7 +195,7 @@ fn no_row_changes_when_a_bit_of_a_chunk_flips() {
                 }
             }
         }
-        assert!(refused > 20 * read, "{compression:?}: {read} read, {refused} refused");
+        assert!(refused > 5 * read, "{compression:?}: {read} read, {refused} refused");
     }
 }
 
